@@ -14,27 +14,26 @@
 
 namespace axisd::core {
 
-BusRecorder& MachineCore::add_recorder(const std::string& bus, int bit_rate) {
-  recorders_.push_back(
-      std::make_unique<BusRecorder>(bus, recorder_memory_, bit_rate, *parts_.clock, parts_.observer));
+BusRecorder& MachineCore::add_recorder(const std::string& bus, int bit_rate, std::size_t memory) {
+  recorders_.push_back(std::make_unique<BusRecorder>(bus, memory, bit_rate, *parts_.clock, parts_.observer));
   return *recorders_.back();
 }
 
-void MachineCore::add_line(const modbus_rtu::LineSettings& line) {
-  add_recorder(line.name, 0);
-  lines_.push_back(
+void MachineCore::add_line(const modbus_rtu::LineSettings& line, std::size_t memory) {
+  add_recorder(line.name, 0, memory);
+  buses_.lines.push_back(
       std::make_unique<modbus_rtu::RtuBus>(parts_.executor, *parts_.clock, line, parts_.make_line(line)));
-  buses_.push_back(lines_.back().get());
+  buses_.all.push_back(buses_.lines.back().get());
 }
 
-void MachineCore::add_network(const canopen::NetworkSettings& network) {
-  auto& recorder = add_recorder(network.name, static_cast<int>(network.bitrate));
-  networks_.push_back(std::make_unique<canopen::CanopenBus>(
+void MachineCore::add_network(const canopen::NetworkSettings& network, std::size_t memory) {
+  auto& recorder = add_recorder(network.name, static_cast<int>(network.bitrate), memory);
+  buses_.networks.push_back(std::make_unique<canopen::CanopenBus>(
       parts_.executor, *parts_.clock, network,
       std::make_unique<ObservedPort>(parts_.make_port(network), *parts_.clock, recorder.network_observer())));
-  buses_.push_back(networks_.back().get());
-  cyclers_.push_back(
-      std::make_unique<LinkCycler>(parts_.executor, *parts_.clock, *networks_.back(), parts_.link_helper));
+  buses_.all.push_back(buses_.networks.back().get());
+  buses_.cyclers.push_back(std::make_unique<LinkCycler>(parts_.executor, *parts_.clock,
+                                                        *buses_.networks.back(), parts_.link_helper));
 }
 
 std::unique_ptr<Axis> MachineCore::make_axis(const AxisSettings& settings, AxisFacePtr face) {
@@ -70,7 +69,7 @@ std::unique_ptr<Axis> MachineCore::make_axis(const AxisSettings& settings, AxisF
                       .inhibited = inhibit_.latched(),
                       .state_unaccepted = state_gate_.refusal(),
                       .holds = holds_.of(settings.name),
-                      .stop_delays = &stop_delays_[settings.bus],
+                      .stop_delays = &buses_.stop_delays[settings.bus],
                       .published = parts_.published,
                       .event = [this](const std::string& axis,
                                       EventContent content) { on_event(axis, std::move(content)); }},

@@ -47,7 +47,6 @@ void log_link(const canopen::CanopenBus& network, std::string& told) {
 
 MachineCore::MachineCore(MachineParts parts, const config::Configuration& configuration)
     : parts_(std::move(parts)),
-      recorder_memory_(static_cast<std::size_t>(configuration.flight_recorder.memory) * 1024),
       book_(*parts_.clock, parts_.instance_id, parts_.journal,
             {.total = static_cast<std::size_t>(configuration.server.limits.request_ids)}),
       audit_(*parts_.clock, parts_.audit),
@@ -89,8 +88,9 @@ MachineCore::MachineCore(MachineParts parts, const config::Configuration& config
               configuration.groups) {
   events_.keep([this](const Event& event) { audit_.event(event); });
   book_.on_open([this](const CommandPtr& command) { commands_.add(command); });
-  for (const auto& line : configuration.lines) add_line(line);
-  for (const auto& network : configuration.networks) add_network(network);
+  const auto memory = static_cast<std::size_t>(configuration.flight_recorder.memory) * 1024;
+  for (const auto& line : configuration.lines) add_line(line, memory);
+  for (const auto& network : configuration.networks) add_network(network, memory);
   for (const auto& entry : configuration.axes) {
     axes_.push_back(make_axis(entry.axis, nullptr));
     by_name_.emplace(entry.axis.name, axes_.back().get());
@@ -106,21 +106,6 @@ void MachineCore::expect_stops() {
   for (const auto& report : parts_.budgets)
     for (const auto& axis : report.axes)
       if (auto* found = find(axis.predicted.axis)) found->expect_stop_within(axis.predicted.all.last_frame);
-}
-
-Bus* MachineCore::find_bus(std::string_view bus) const {
-  const auto found = std::ranges::find_if(buses_, [&](const auto* b) { return b->name() == bus; });
-  return found == buses_.end() ? nullptr : *found;
-}
-
-modbus_rtu::RtuBus* MachineCore::find_line(std::string_view bus) const {
-  const auto found = std::ranges::find_if(lines_, [&](const auto& b) { return b->name() == bus; });
-  return found == lines_.end() ? nullptr : found->get();
-}
-
-canopen::CanopenBus* MachineCore::find_network(std::string_view bus) const {
-  const auto found = std::ranges::find_if(networks_, [&](const auto& b) { return b->name() == bus; });
-  return found == networks_.end() ? nullptr : found->get();
 }
 
 void MachineCore::launch(Task<> sequence, const char* name) {
@@ -141,11 +126,12 @@ void MachineCore::start() {
   inhibit_.start();
   for (const auto& command : book_.take_interrupted()) commands_.follow(command);
   expect_stops();
-  for (std::size_t i = 0; i < lines_.size(); ++i) lines_[i]->start(recorders_[i]->exchange_observer());
-  for (const auto& network : networks_) network->start();
-  for (const auto& cycler : cyclers_) launch(cycler->run(), "link cycler");
-  for (const auto& network : networks_) launch(watch(*network), "network watch");
-  for (auto* bus : buses_) launch(watch_port(*bus), "port watch");
+  for (std::size_t i = 0; i < buses_.lines.size(); ++i)
+    buses_.lines[i]->start(recorders_[i]->exchange_observer());
+  for (const auto& network : buses_.networks) network->start();
+  for (const auto& cycler : buses_.cyclers) launch(cycler->run(), "link cycler");
+  for (const auto& network : buses_.networks) launch(watch(*network), "network watch");
+  for (auto* bus : buses_.all) launch(watch_port(*bus), "port watch");
   for (const auto& axis : axes_) axis->start();
   book_.give_up_unsettled();
   for (const auto& device : devices_) device->start();
@@ -324,20 +310,20 @@ void MachineCore::close() {
   leases_.close();
   for (const auto& axis : axes_) axis->close();
   for (const auto& device : devices_) device->close();
-  for (const auto& cycler : cyclers_) cycler->close();
-  for (auto* bus : buses_) bus->close();
+  for (const auto& cycler : buses_.cyclers) cycler->close();
+  for (auto* bus : buses_.all) bus->close();
 }
 
 bool MachineCore::closed() const {
   return sequences_ == 0 && std::ranges::all_of(axes_, [](const auto& axis) { return axis->closed(); }) &&
          std::ranges::all_of(devices_, [](const auto& device) { return device->closed(); }) &&
-         std::ranges::all_of(buses_, [](const auto* bus) { return bus->idle(); });
+         std::ranges::all_of(buses_.all, [](const auto* bus) { return bus->idle(); });
 }
 
 std::vector<BusStatus> MachineCore::bus_status() const {
   std::vector<BusStatus> all;
-  all.reserve(lines_.size() + networks_.size());
-  for (const auto& bus : lines_)
+  all.reserve(buses_.lines.size() + buses_.networks.size());
+  for (const auto& bus : buses_.lines)
     all.push_back({.name = bus->settings().name,
                    .port = bus->settings().port,
                    .baud = bus->settings().baud,
@@ -345,8 +331,8 @@ std::vector<BusStatus> MachineCore::bus_status() const {
                    .simulated = bus->settings().simulated(),
                    .error = bus->port().error,
                    .counters = bus->counters()});
-  for (std::size_t i = 0; i < networks_.size(); ++i) {
-    const auto& bus = networks_[i];
+  for (std::size_t i = 0; i < buses_.networks.size(); ++i) {
+    const auto& bus = buses_.networks[i];
     all.push_back({.name = bus->settings().name,
                    .kind = BusKind::canopen,
                    .port = bus->settings().interface,
@@ -354,7 +340,7 @@ std::vector<BusStatus> MachineCore::bus_status() const {
                    .open = bus->port().open,
                    .simulated = bus->settings().simulated(),
                    .error = bus->port().error ? bus->port().error : bus->sync_trouble(),
-                   .network = network_status(*bus, *cyclers_[i])});
+                   .network = network_status(*bus, *buses_.cyclers[i])});
   }
   return all;
 }
@@ -367,14 +353,9 @@ std::vector<BusBudgetReport> MachineCore::budgets() const {
   return reports;
 }
 
-StopDelays MachineCore::stop_delays(std::string_view bus) const {
-  const auto found = stop_delays_.find(bus);
-  return found == stop_delays_.end() ? StopDelays{} : found->second;
-}
-
 bool MachineCore::buses_reported() const {
   return std::ranges::all_of(
-      buses_, [](const auto* bus) { return bus->port().open || bus->port().error.has_value(); });
+      buses_.all, [](const auto* bus) { return bus->port().open || bus->port().error.has_value(); });
 }
 
 }  // namespace axisd::core

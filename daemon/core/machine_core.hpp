@@ -20,6 +20,7 @@
 #include "daemon/core/group_keeper.hpp"
 #include "daemon/core/lease_keeper.hpp"
 #include "daemon/core/link_cycler.hpp"
+#include "daemon/core/machine_buses.hpp"
 #include "daemon/core/machine_table.hpp"
 #include "daemon/core/motion_inhibit.hpp"
 #include "daemon/core/reload.hpp"
@@ -69,16 +70,18 @@ class MachineCore {
   [[nodiscard]] Axis* find(std::string_view axis) const;
   [[nodiscard]] const std::vector<std::unique_ptr<Axis>>& axes() const { return axes_; }
   /// All buses, of either kind.
-  [[nodiscard]] const std::vector<Bus*>& buses() const { return buses_; }
+  [[nodiscard]] const std::vector<Bus*>& buses() const { return buses_.all; }
   [[nodiscard]] const std::vector<std::unique_ptr<canopen::CanopenBus>>& networks() const {
-    return networks_;
+    return buses_.networks;
   }
   /// nullptr if there is none of that name.
-  [[nodiscard]] Bus* find_bus(std::string_view bus) const;
+  [[nodiscard]] Bus* find_bus(std::string_view bus) const { return buses_.find(bus); }
   /// The same, if it is an RS-485 line.
-  [[nodiscard]] modbus_rtu::RtuBus* find_line(std::string_view bus) const;
+  [[nodiscard]] modbus_rtu::RtuBus* find_line(std::string_view bus) const { return buses_.find_line(bus); }
   /// The same, if it is a CAN network.
-  [[nodiscard]] canopen::CanopenBus* find_network(std::string_view bus) const;
+  [[nodiscard]] canopen::CanopenBus* find_network(std::string_view bus) const {
+    return buses_.find_network(bus);
+  }
   /// Nodes that are not axes, in the order of the file.
   [[nodiscard]] const std::vector<std::unique_ptr<Device>>& devices() const { return devices_; }
   [[nodiscard]] CommandBook& book() { return book_; }
@@ -122,7 +125,7 @@ class MachineCore {
 
   [[nodiscard]] std::vector<BusStatus> bus_status() const;
   /// Of a bus, since the start.
-  [[nodiscard]] StopDelays stop_delays(std::string_view bus) const;
+  [[nodiscard]] StopDelays stop_delays(std::string_view bus) const { return buses_.delays_of(bus); }
   /// Why nothing new is started: the command journal or the audit cannot be written. Thread: any.
   [[nodiscard]] std::optional<Error> storage_error() const { return book_.trouble(); }
   /// What sees the frames of a bus. nullptr if there is none of that name.
@@ -147,8 +150,9 @@ class MachineCore {
   };
 
   // machine_build.cpp: what the configuration names
-  void add_line(const modbus_rtu::LineSettings& line);
-  void add_network(const canopen::NetworkSettings& network);
+  /// `memory`: of its recorder, bytes.
+  void add_line(const modbus_rtu::LineSettings& line, std::size_t memory);
+  void add_network(const canopen::NetworkSettings& network, std::size_t memory);
   /// `face`: of the axis that it takes the place of; nullptr: there was none.
   [[nodiscard]] std::unique_ptr<Axis> make_axis(const AxisSettings& settings, AxisFacePtr face);
   [[nodiscard]] std::unique_ptr<Device> make_device(const DeviceSettings& settings);
@@ -180,29 +184,23 @@ class MachineCore {
   void expect_stops();
   Task<> watch(canopen::CanopenBus& network);
   Task<> watch_port(Bus& bus);
-  BusRecorder& add_recorder(const std::string& bus, int bit_rate);
+  BusRecorder& add_recorder(const std::string& bus, int bit_rate, std::size_t memory);
   void on_event(const std::string& axis, EventContent content);
   void note_fault(const Axis& axis, const EventContent& content);
   void tell_inhibit(InhibitChange change);
 
   MachineParts parts_;
-  const std::size_t recorder_memory_;  ///< bytes, of each bus
   CommandBook book_;
   AuditTrail audit_;
   EventLog events_;
   CommandLog commands_;
-  std::vector<std::unique_ptr<BusRecorder>> recorders_;  ///< one per bus; before these, which tell them
+  std::vector<std::unique_ptr<BusRecorder>> recorders_;  ///< one per bus; before the buses, which tell them
   FlightRecorder flight_recorder_;
   LeaseKeeper leases_;
   StopHoldKeeper holds_;
   StateGate state_gate_;
   MotionInhibit inhibit_;
-  std::map<std::string, StopDelays, std::less<>>
-      stop_delays_;  ///< by bus; before the axes, which count there
-  std::vector<std::unique_ptr<modbus_rtu::RtuBus>> lines_;
-  std::vector<std::unique_ptr<canopen::CanopenBus>> networks_;
-  std::vector<std::unique_ptr<LinkCycler>> cyclers_;  ///< one per network
-  std::vector<Bus*> buses_;
+  MachineBuses buses_;  ///< before the axes, which use them
   std::vector<std::unique_ptr<Axis>> axes_;
   std::vector<std::unique_ptr<Device>> devices_;
   GroupKeeper groups_;  ///< after the axes, which its moves are of
