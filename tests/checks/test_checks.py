@@ -8,6 +8,7 @@ from pathlib import Path
 
 import documents
 import layering
+import members
 import texts
 
 GOOD = {
@@ -97,6 +98,31 @@ BAD_TEXTS = {
     "long.cpp": ("x\n" * 601, "601 lines"),
 }
 
+# 20 data members, and all that is none.
+A_CLASS = """class Small final : public Base<int> {
+ public:
+  explicit Small(int a_) : one_(a_) {}
+  [[nodiscard]] int one() const { return one_; }
+  std::function<void(int)> handler(int first, int another_,
+                                   int third_);
+  enum class Kind { a_, b_ };
+
+ private:
+  struct Inner {
+    int not_mine_ = 0;
+  };
+  static constexpr int none_ = 1;
+  using Other_ = int;
+  std::function<void(std::map<int, int>)> one_;  ///< not two_, nor three_;
+  int two_ = 0, three_{}, four_[4], five_ = f(1);
+  std::map<std::string, std::vector<int>, std::less<>>
+      six_;
+  std::shared_ptr<int> seven_ = std::make_shared<int>();
+  int eight_, nine_, ten_, eleven_, twelve_, thirteen_, fourteen_, fifteen_;
+  int sixteen_, seventeen_, eighteen_, nineteen_, twenty_;MORE
+};
+"""
+
 BAD_DOCUMENTS = {  # path -> (text, what the finding says)
     "devices/m1/a.cpp": ("/// M2: whoever wrote this knows.", "M2 has no heading"),
     "tests/rules/b_test.cpp": ("TEST(M03Late, Never) {}", "M3 has no heading"),
@@ -133,6 +159,7 @@ class Checks(unittest.TestCase):
         self.assertEqual(layering.findings(self.root), [])
         self.assertEqual(texts.findings(self.root), ([], []))
         self.assertEqual(documents.findings(self.root), [])
+        self.assertEqual(members.findings(self.root), [])
 
     def expect_only(self, found, expected):
         """Each bad file has one finding, which says why; no other file has any."""
@@ -167,6 +194,13 @@ class Checks(unittest.TestCase):
         (self.root / "docs/rules.md").unlink()
         found = documents.findings(self.root)
         self.assertTrue(any("M14 has no heading" in line for line in found), found)
+
+    def test_data_members_are_counted(self):
+        make_tree(self.root, {"buses/small.hpp": A_CLASS.replace("MORE", "")})
+        self.assertEqual(members.findings(self.root), [])
+        make_tree(self.root, {"buses/large.hpp": A_CLASS.replace("MORE", "\n  int more_;"),
+                              "tests/large.hpp": A_CLASS.replace("MORE", "\n  int more_;")})
+        self.expect_only(members.findings(self.root), {"buses/large.hpp": "Small has 21 data members, at most 20"})
 
     def test_long_files_are_warned_of(self):
         make_tree(self.root, {"longish.cpp": "x\n" * 401})
