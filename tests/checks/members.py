@@ -13,7 +13,7 @@ KNOWN = {
     ("api/cell/cell.hpp", "Cell"): 26,
     ("api/transport/accept_loop.hpp", "AcceptLoop"): 27,
     ("api/web/gateway/connection.hpp", "Connection"): 21,
-    ("buses/modbus_rtu/rtu_bus.hpp", "RtuBus"): 26,
+    ("buses/modbus_rtu/rtu_bus.hpp", "RtuBus"): 27,
     ("daemon/store/journal_file.hpp", "JournalFile"): 21,
     ("devices/axis/axis.hpp", "Axis"): 46,
     ("devices/cia402_eds/simulator.hpp", "StandardDrive"): 43,
