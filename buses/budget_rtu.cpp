@@ -64,7 +64,10 @@ class Analysis {
   [[nodiscard]] Duration wait_moving(int moving, int starting, Duration late) const;
   [[nodiscard]] Duration wait_idle(int moving) const;
   [[nodiscard]] Duration start(int starting) const;
-  [[nodiscard]] Duration refresh_moving(const AxisDemand& axis, Duration wait) const;
+  [[nodiscard]] Duration refresh(const AxisDemand& axis, Duration period, Duration wait) const;
+  [[nodiscard]] Duration refresh_moving(const AxisDemand& axis, Duration wait) const {
+    return refresh(axis, std::max(axis.poll_moving, axis.quiet_before_end), wait);
+  }
   [[nodiscard]] Duration refresh_idle(const AxisDemand& axis, Duration wait) const;
   [[nodiscard]] double utilisation(int moving, bool slow) const;
 
@@ -112,18 +115,19 @@ Duration Analysis::reservations(std::int64_t overtaking) const {
   return reserved * (silence(demand_.line) + in_flight_ + late_);
 }
 
-/// From the queue to the first byte, in class moving_state. Each other axis has at most one exchange before
-/// it, or one chain while it starts; silent nodes may have to be stopped again.
+/// From the queue to the first byte, in class moving_state, whose order is that of arrival. Each other axis
+/// has at most one exchange before it, and one chain: it starts again only when it was read behind this one.
+/// Silent nodes may have to be stopped again.
 /// `late`: what silent ones among them cost more than ones that answer late.
 Duration Analysis::wait_moving(int moving, int starting, Duration late) const {
   const auto others = static_cast<std::size_t>(std::max(0, moving - 1));
   const auto chains = std::min(others, static_cast<std::size_t>(starting));
   const auto poll = [this](const AxisDemand& axis) { return cost(axis.set.state, axis); };
   const auto chain = [this](const AxisDemand& axis) {
-    return std::max(cost(axis.set.start, axis), cost(axis.set.state, axis));
+    return cost(axis.set.start, axis) + cost(axis.set.state, axis);
   };
-  const auto overtaking =
-      static_cast<std::int64_t>(others - chains) + static_cast<std::int64_t>(chains) * longest_chain_ + 1;
+  const auto overtaking = static_cast<std::int64_t>(others - chains) +
+                          static_cast<std::int64_t>(chains) * (longest_chain_ + 1) + 1;
   return in_flight_ + late_ + dearest(chains, chain) + dearest(others - chains, poll) + late +
          reservations(overtaking) + silence(demand_.line);
 }
@@ -156,19 +160,24 @@ Duration Analysis::wait_idle(int moving) const {
   return std::min(wait, by_reservation);
 }
 
-/// Each has its turn: it is read, then comes its chain. Before it has it, it may be read once, too.
+/// Each has its turn: it is read, then comes its chain. Before it has it, it may be read once, too; and its
+/// turn gives way to a reading of any axis.
 Duration Analysis::start(int starting) const {
   const auto turn = [this](const AxisDemand& axis) {
     return 2 * cost(axis.set.state, axis) + cost(axis.set.start, axis);
   };
-  return in_flight_ + late_ + dearest(static_cast<std::size_t>(starting), turn) +
-         reservations(starting * (longest_chain_ + 2));
+  const auto reading = dearest(1, [this](const AxisDemand& axis) {
+    return std::max(
+        {cost(axis.set.state, axis), cost(axis.set.continuity, axis), cost(axis.set.longest, axis)});
+  });
+  const auto first = starting + static_cast<std::int64_t>(most_that_go_first);
+  return in_flight_ + late_ + dearest(static_cast<std::size_t>(starting), turn) + first * reading +
+         reservations(starting * (longest_chain_ + 2) + first);
 }
 
 /// One reading may be preceded by the canary; the next one is asked for a period after the last, or at once.
-Duration Analysis::refresh_moving(const AxisDemand& axis, Duration wait) const {
-  return std::max(axis.poll_moving, answered(axis.set.state, axis)) + wait +
-         answered(axis.set.continuity, axis) + wait;
+Duration Analysis::refresh(const AxisDemand& axis, Duration period, Duration wait) const {
+  return std::max(period, answered(axis.set.state, axis)) + wait + answered(axis.set.continuity, axis) + wait;
 }
 
 Duration Analysis::refresh_idle(const AxisDemand& axis, Duration wait) const {
@@ -232,8 +241,8 @@ StopBudget Analysis::stop(const AxisDemand& last, int axes) const {
   const auto hastened = dearest(static_cast<std::size_t>(axes),
                                 [this](const AxisDemand& axis) { return cost(axis.set.longest, axis); });
   const auto wait = wait_moving(count(), count() - axes, std::max(1, count() - 1) * reply_margin);
-  stop.standstill = stop.last_frame + acknowledged + refresh_moving(last, wait) + told_again + hastened +
-                    answered(last.set.state, last);
+  stop.standstill = stop.last_frame + acknowledged + refresh(last, last.poll_moving, wait) + told_again +
+                    hastened + answered(last.set.state, last);
   return stop;
 }
 

@@ -15,6 +15,7 @@ struct AxisDemand {
   RtuTransactionSet set{};
   Duration poll_moving{}, poll_idle{};       ///< > 0
   Duration poll_fastest{};                   ///< where the end of a motion is awaited; > 0
+  Duration quiet_before_end{};               ///< of a motion, if that is more than poll_moving
   Duration continuity_period{};              ///< of the canary; > 0
   Duration drift_check{};                    ///< > 0
   bool segments = false;                     ///< the configuration owns its segment table, too

@@ -65,6 +65,7 @@ void StartTurns::give_to_next() {
   const auto& next = *waiting;
   next->state = State::has_turn;
   next->since = clock_->now();
+  ++begun_;
   over_ = clock_->call_at(next->since + longest_start * next->starts, [this, overdue = next] {
     overdue->state = State::overstayed;
     give_to_next();

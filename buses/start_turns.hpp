@@ -59,6 +59,8 @@ class StartTurns {
 
   /// How long who asks now would wait for all that were announced, by how long starts took lately.
   [[nodiscard]] Duration expected_wait() const;
+  /// Turns that have begun so far.
+  [[nodiscard]] std::uint64_t begun() const { return begun_; }
   /// Those that wait, without the one whose turn it is.
   [[nodiscard]] std::size_t waiting() const;
 
@@ -73,6 +75,7 @@ class StartTurns {
   Clock* clock_;
   std::list<PlacePtr> places_;  ///< in the order in which they were announced; none has left
   Clock::Timer over_;
+  std::uint64_t begun_ = 0;
   Duration usual_;  ///< of a start: a mean of the last that were sent
 };
 

@@ -27,6 +27,9 @@ struct TransactionOptions {
   TransactionClass transaction_class = TransactionClass::parameters;
   TimePoint deadline = TimePoint::max();  ///< not sent after this
   MotionGuard guard{};                    ///< for motion frames
+  /// Of a reading in class moving_state on an RS-485 line: from then on its answer is likely to end a
+  /// command. Until it has gone out its class goes before starts then, as far as these can wait.
+  TimePoint awaited_from = TimePoint::max();
   /// Of a stop that was sent in vain before: while its node does not answer anything, it is repeated as
   /// seldom as the node is probed.
   bool patient = false;

@@ -11,6 +11,12 @@ ExchangeResult not_sent(Verdict verdict, TimePoint now) {
   return {.status = ExchangeStatus::not_sent, .verdict = verdict, .request_begin = now, .request_end = now};
 }
 
+/// Characters of a request to read; with their replies of a reading of a drive's state, and of a trigger.
+constexpr std::size_t size_of_read = 8, longest_reading = 40, size_of_write = 16;
+/// So old a proof may get until the next start (M6): its client takes a moment, and reboot_guard is 100 ms
+/// mostly.
+constexpr Duration longest_proof = std::chrono::milliseconds(80);
+
 /// State twice, canary, block and trigger, and a reading of another axis between them, where all answer at
 /// once: 169 characters and twelve silences.
 Duration usual_start(const LineSettings& settings) {
@@ -91,6 +97,7 @@ Result<TransactionPtr> RtuBus::prepare(Request request, TransactionOptions optio
   auto transaction = std::make_unique<Transaction>();
   transaction->transaction_class = options.transaction_class;
   transaction->patient = options.patient;
+  transaction->awaited_from = options.awaited_from;
   transaction->queued_at = clock_->now();
   transaction->exchange = exchange_for(std::move(request), *frame, std::move(options));
   return transaction;
@@ -218,9 +225,40 @@ void RtuBus::finish(std::span<const ExchangeResult> results) {
   }
 }
 
+/// What the order of the queue says; but whoever waits for the end of a motion goes before a start that can
+/// wait. Not where so many starts wait that the reading would be too old to be the proof for the next start
+/// of its axis (M6). Each turn to start gives way to one reading, and to a few that turns before it were
+/// spared: so much the published start counts.
+TransactionPtr RtuBus::pop(TimePoint now) {
+  const auto* const start = queue_.next_of(TransactionClass::motion);
+  if (start == nullptr || !can_wait(*start, now)) return queue_.pop();
+  if (start_turns_.expected_wait() + usual_start(settings_) > longest_proof) return queue_.pop();
+  const auto turns = start_turns_.begun();
+  gave_way_ = std::max(gave_way_, turns - std::min(turns, most_that_go_first));
+  if (gave_way_ == turns) return queue_.pop();
+  // By then a reading would arrive at its drive.
+  const auto asked = now + silence(settings_.serial()) + wire_time(settings_.serial(), size_of_read);
+  auto next = queue_.pop(asked);
+  if (next->transaction_class == TransactionClass::moving_state) ++gave_way_;
+  return next;
+}
+
+/// Its guard leaves time for a reading before it, and for another frame of its chain behind it, one of them
+/// answered as late as may be (M6). Members of a group start back to back (M22).
+bool RtuBus::can_wait(const Transaction& motion, TimePoint now) const {
+  const auto& exchange = motion.exchange;
+  if (exchange.guard.with) return false;
+  const auto until = std::min(exchange.deadline, exchange.guard.not_after);
+  if (until == TimePoint::max()) return true;
+  const auto& line = settings_.serial();
+  const auto wire =
+      wire_time(line, longest_reading + exchange.frame.size() + reply_size(exchange.request) + size_of_write);
+  return now + wire + 6 * silence(line) + turnaround_max(exchange.request.node) < until;
+}
+
 void RtuBus::arm_next() {
   const auto now = clock_->now();
-  while (auto next = queue_.pop()) {
+  while (auto next = pop(now)) {
     if (may_send(next->exchange.guard, now) != Verdict::send) {
       drop(std::move(next), now);
     } else if (must_wait(*next, now)) {

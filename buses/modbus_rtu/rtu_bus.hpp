@@ -124,6 +124,8 @@ class RtuBus final : public Bus {
   bool recall(std::uint8_t node);
   static void know(Exchange& exchange, Known& known);
   void note_known(const Exchange& exchange, const ExchangeResult& result);
+  [[nodiscard]] TransactionPtr pop(TimePoint now);
+  [[nodiscard]] bool can_wait(const Transaction& motion, TimePoint now) const;
   void arm_next();
   [[nodiscard]] bool must_wait(const Transaction& transaction, TimePoint now) const;
   [[nodiscard]] TimePoint ready_at(std::uint8_t node, TimePoint now) const;
@@ -150,6 +152,7 @@ class RtuBus final : public Bus {
   PortStatus port_;
   Signal port_changed_;
   StartTurns start_turns_;
+  std::uint64_t gave_way_ = 0;  ///< turns to start, to readings of other axes; never more than have begun
   TransactionQueue queue_;
   std::vector<TransactionPtr> round_;          ///< armed or under way, in the order of the line
   NodeTable<std::unique_ptr<Watch>> watches_;  ///< null: no more

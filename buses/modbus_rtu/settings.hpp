@@ -32,6 +32,9 @@ struct SerialSettings {
 /// Of the wait for a reply, on top of what the wire and the node take: operating system and USB adapters.
 inline constexpr Duration reply_margin = std::chrono::milliseconds(10);
 
+/// Readings that may go before starts on top of one for each turn (StartTurns), where a while ago fewer did.
+inline constexpr std::uint64_t most_that_go_first = 4;
+
 /// One RS-485 line as the YAML describes it.
 struct LineSettings {
   std::string name;   ///< bus name

@@ -60,7 +60,10 @@ void TransactionQueue::push_again(TransactionPtr transaction) {
   insert(std::move(transaction), false);
 }
 
-void TransactionQueue::put_back(TransactionPtr transaction) { insert(std::move(transaction), false); }
+void TransactionQueue::put_back(TransactionPtr transaction) {
+  transaction->reserved = false;
+  insert(std::move(transaction), false);
+}
 
 void TransactionQueue::hold(TransactionPtr transaction) { insert(std::move(transaction), true); }
 
@@ -74,6 +77,7 @@ bool TransactionQueue::merge(Transaction& transaction) {
   known->watch = nullptr;  // somebody waits for it
   std::ranges::move(transaction.on_end, std::back_inserter(known->on_end));
   known->transaction_class = std::min(known->transaction_class, transaction.transaction_class);
+  known->awaited_from = std::min(known->awaited_from, transaction.awaited_from);
   known->patient = known->patient && transaction.patient;
   known->doubtful = known->doubtful && transaction.doubtful;
   // The later deadline: an answer that still serves one of them is worth sending for.
@@ -118,12 +122,17 @@ TransactionPtr TransactionQueue::take(Transaction* transaction) {
   return taken;
 }
 
-TransactionPtr TransactionQueue::pop() {
+TransactionPtr TransactionQueue::pop(std::optional<TimePoint> awaited_by) {
+  constexpr auto stop = static_cast<std::size_t>(TransactionClass::stop),
+                 motion = static_cast<std::size_t>(TransactionClass::motion),
+                 readings = static_cast<std::size_t>(TransactionClass::moving_state);
   const auto first = std::ranges::find_if(lanes_, [](const Lane& lane) { return !lane.empty(); });
   if (first == lanes_.end()) return nullptr;
-  auto* chosen = &*first;
-  const bool stop_waits = first == lanes_.begin();
-  auto* lower = stop_waits ? nullptr : next_below(static_cast<std::size_t>(first - lanes_.begin()));
+  auto top = static_cast<std::size_t>(first - lanes_.begin());
+  const bool before_motion = top == motion && awaited_by && is_awaited(*awaited_by);
+  if (before_motion) top = readings;
+  auto* chosen = &lanes_.at(top);
+  auto* lower = top == stop ? nullptr : next_below(top);
   const bool reserved = lower != nullptr && ++popped_since_reservation_ >= reservation_;
   if (reserved) {
     popped_since_reservation_ = 0;
@@ -131,8 +140,18 @@ TransactionPtr TransactionQueue::pop() {
     chosen = lower;
   }
   auto transaction = take(chosen->begin()->get());
-  transaction->reserved = reserved;
+  transaction->reserved = reserved || before_motion;
   return transaction;
+}
+
+bool TransactionQueue::is_awaited(TimePoint by) const {
+  return std::ranges::any_of(lanes_.at(static_cast<std::size_t>(TransactionClass::moving_state)),
+                             [by](const TransactionPtr& one) { return one->awaited_from <= by; });
+}
+
+const Transaction* TransactionQueue::next_of(TransactionClass transaction_class) const {
+  const auto& waiting = lanes_.at(static_cast<std::size_t>(transaction_class));
+  return waiting.empty() ? nullptr : waiting.begin()->get();
 }
 
 /// The waiting class below `top` whose turn it is: the first one after the last that had a reservation.

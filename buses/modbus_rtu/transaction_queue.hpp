@@ -30,8 +30,9 @@ struct Transaction {
   /// Though a stop, it waits as others do for a node in quarantine, and goes with the readings of moving
   /// axes.
   bool patient = false;
+  TimePoint awaited_from = TimePoint::max();  ///< as in TransactionOptions
   bool doubtful = false;   ///< a stop that is likely to go unanswered: it lets others go first
-  bool reserved = false;   ///< it was given out by the reservation: only a stop may take its place
+  bool reserved = false;   ///< it was given out before motion that waits: only a stop may take its place
   Watch* watch = nullptr;  ///< that may repeat it
   bool given_up = false;   ///< unless it goes out before it can be taken back
   /// Called exactly once each, unless its watch ends between two readings. Several: identical reads or stops
@@ -61,8 +62,12 @@ class TransactionQueue {
   void push_again(TransactionPtr transaction);
   /// Returns one that pop() gave out but that was not sent, to its old place.
   void put_back(TransactionPtr transaction);
-  /// The next one, or nullptr. Whether it may be sent still is the caller's to ask.
-  TransactionPtr pop();
+  /// The next one, or nullptr. Whether it may be sent still is the caller's to ask. `awaited_by`: motion can
+  /// wait; where a reading of class moving_state is awaited by then its class goes before motion. Within the
+  /// class nothing changes: whoever waits for another reading is not kept waiting by it.
+  TransactionPtr pop(std::optional<TimePoint> awaited_by = {});
+  /// The next one of its class, or nullptr.
+  [[nodiscard]] const Transaction* next_of(TransactionClass transaction_class) const;
   /// Nothing is to be given out but class idle_state.
   [[nodiscard]] bool only_idle() const;
   /// What pop() gives then, or nullptr.
@@ -117,6 +122,7 @@ class TransactionQueue {
   void insert(TransactionPtr transaction, bool held);
   TransactionPtr take(Transaction* transaction);
   bool merge(Transaction& transaction);
+  [[nodiscard]] bool is_awaited(TimePoint by) const;
   Lane* next_below(std::size_t top);
 
   std::array<Lane, transaction_class_count> lanes_;

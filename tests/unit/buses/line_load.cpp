@@ -105,8 +105,11 @@ Task<> LineLoad::poll(LoadedAxis& axis, const AxisDemand& demand) {
       if (answered) axis.last_continuity = world_.now();
     }
     Answer answer;
-    if (answered)
-      answered = co_await exchange(axis.node, first_register, demand.set.state, options(), &answer);
+    if (answered) {
+      auto state = options();
+      if (std::exchange(axis.end_is_near, false)) state.awaited_from = began;
+      answered = co_await exchange(axis.node, first_register, demand.set.state, std::move(state), &answer);
+    }
     if (answered) {
       if (axis.last_asked)
         axis.longest_refresh = std::max(axis.longest_refresh, answer.sent_at - *axis.last_asked);
@@ -132,12 +135,19 @@ Task<> LineLoad::start_now_and_then(LoadedAxis& axis, const AxisDemand& demand) 
     if (axis.stopping) continue;
     ++axis.chains;
     axis.last_asked.reset();
+    // In its turn, so that it gives way to readings; and as if nobody had turns.
+    StartTurns::Turn turn;
+    if (random(0, 1) == 0) {
+      turn = bus_->start_turns()->announce();
+      co_await bus_->start_turns()->take(turn);
+    }
     const MotionGuard guard{.gate = axis.gate, .epoch = axis.gate->epoch()};
     for (const auto one : demand.set.start)
       if (!co_await exchange(axis.node, first_register, one,
                              {.transaction_class = TransactionClass::motion, .guard = guard}))
         break;
     --axis.chains;
+    axis.end_is_near = true;
     axis.wake.notify_all();
   }
 }

@@ -24,7 +24,8 @@ struct LoadedAxis {
   std::uint8_t node = 0;
   bool moving = false, silent = false, stopping = false;
   std::shared_ptr<AxisGate> gate = std::make_shared<AxisGate>();
-  int chains = 0;  ///< starts under way: no polls meanwhile
+  int chains = 0;            ///< starts under way: no polls meanwhile
+  bool end_is_near = false;  ///< of what was started last: the next reading is awaited
   Signal wake;
   std::optional<TimePoint> last_asked, last_continuity, last_start;
   Duration longest_refresh{};
