@@ -40,9 +40,9 @@ class Bus {
   /// `gate` of `node` was raised: the motion frames that it guarded end, whether they wait or are armed.
   /// Called for each stop before its frame is queued; what waits for others costs it no time.
   virtual void purge_superseded(std::uint8_t node, const AxisGate& gate) = 0;
-  /// The axis of `node` is offline, or is stopped again while it does not answer: readings for it that wait
-  /// end as superseded, so that what it is owed now need not wait for them. Not those of class `parameters`,
-  /// which others asked for, unless they were hastened.
+  /// The axis of `node` is offline, or is stopped again while it does not answer, or has started since:
+  /// readings for it that wait end as superseded, so that what it is owed now need not wait for them. Not
+  /// those of class `parameters`, which others asked for, unless they were hastened.
   virtual void give_up_readings(std::uint8_t /*node*/) {}
   /// A state that the bus reads again and again by itself, because it stays the same, is told with the next
   /// reading, or at once that there is none (Drive::watch_state).

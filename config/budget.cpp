@@ -16,6 +16,7 @@
 #include "config/quantity.hpp"
 #include "config/start_warnings.hpp"
 #include "devices/axis/planner.hpp"
+#include "devices/axis/poll_pace.hpp"
 #include "devices/descriptor.hpp"
 #include "devices/generic/value.hpp"
 
@@ -31,6 +32,7 @@ modbus_rtu::LineDemand demand_of(const modbus_rtu::LineSettings& line, const Con
                              .poll_moving = axis.poll_moving,
                              .poll_idle = axis.poll_idle,
                              .poll_fastest = std::min(axis.poll_moving, fastest_poll),
+                             .quiet_before_end = quiet_before_end,
                              .continuity_period = continuity_period,
                              .drift_check = axis.drift_check,
                              .segments = axis.segments.has_value(),

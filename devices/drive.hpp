@@ -186,7 +186,12 @@ class Drive {
 
   /// The whole state, coherent as far as the bus allows. Error `rebooted`: as of check_continuity(), where
   /// the node itself said so.
-  virtual Task<Result<DriveSample>> read_state(TransactionClass transaction_class) = 0;
+  /// `awaited_from`: as in TransactionOptions.
+  virtual Task<Result<DriveSample>> read_state(TransactionClass transaction_class,
+                                               TimePoint awaited_from) = 0;
+  Task<Result<DriveSample>> read_state(TransactionClass transaction_class) {
+    return read_state(transaction_class, TimePoint::max());
+  }
 
   /// The same, in class idle_state, again and again for as long as `watch` says of a reading that it tells
   /// nothing new. Ends with the first that does; nothing: Bus::end_repetition() came between two, or

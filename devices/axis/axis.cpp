@@ -128,6 +128,7 @@ bool Axis::limit_active(bool positive) const {
 void Axis::on_sample(const DriveSample& sample) {
   const auto before = sample_;
   sample_ = sample;
+  pace_.seen(sample.asked_at, sample.moving);
   if (before) tell_edges(*before, sample);
   const auto counter = tracker_.counter();
   if (!shaft_.rezeroes()) tracker_.update(sample.position_pulses, drive_->position_window());

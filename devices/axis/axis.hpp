@@ -188,7 +188,9 @@ class Axis {
     bool repeated = false;  ///< the sample was asked for later than by the poll loop
   };
   Task<> poll();
+  [[nodiscard]] TimePoint next_poll(const Polling& polling, TimePoint began) const;
   Task<bool> poll_once(Polling& polling);
+  [[nodiscard]] Error not_heard() const;
   Task<Result<std::optional<DriveSample>>> next_sample(Polling& polling);
   bool seen_again(const DriveSample& sample);
   [[nodiscard]] bool only_watches() const;
@@ -197,6 +199,7 @@ class Axis {
   Task<Result<void>> prove_continuity(TransactionClass priority);
   /// Polls as fast as the bus can, while the axis is busy, from `from` on and for `longest` at most.
   void poll_fast(TimePoint from, Duration longest);
+  void poll_for_end(TimePoint from, Duration longest);
   void keep_quiet(TimePoint until);
   [[nodiscard]] bool keeps_quiet() const;
 
@@ -486,6 +489,7 @@ class Axis {
   Signal wake_;     ///< the poll loop has something to look at
   Signal stopped_;  ///< the stop sequence ended
   int chains_ = 0;
+  int comparisons_ = 0;             ///< of the drive's configuration, that are being read
   int sequences_ = 0;               ///< coroutines that still run
   std::uint64_t accept_epoch_ = 0;  ///< of the request being accepted: a stop raised meanwhile makes it old
 

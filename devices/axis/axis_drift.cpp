@@ -24,7 +24,9 @@ Task<> Axis::look_for_drift() {
 
 Task<Result<void>> Axis::check_for_drift() {
   drift_.checked(env_.clock->now());
+  ++comparisons_;
   const auto drift = co_await drive_->check_drift(TransactionClass::idle_state);
+  --comparisons_;
   if (!drift) co_return fail(drift.error());
   if (drift->scale_changed) lose_trust();
   set_drift(drift->text);

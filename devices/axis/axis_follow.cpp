@@ -167,14 +167,16 @@ bool Axis::held_back(const Plan& plan) const {
 /// When a motion is read that was acknowledged at `since`: its end is to be told at once, and before it has
 /// something to tell the line is left to others.
 void Axis::expect_end(const Plan& plan, std::int64_t base, TimePoint since) {
-  auto quiet = std::min<Duration>(settings_.poll_moving, longest_quiet);
+  pace_.came();
   if (!plan.endless) {
     const auto soonest = planner_.soonest(plan, plan.target->counter - base);
     const auto lead = std::min(soonest / end_lead_share, longest_end_lead);
-    quiet = std::min(quiet, soonest - lead);
-    poll_fast(since + soonest - lead, plan.predicted - soonest + lead + end_window);
+    poll_for_end(since + soonest - lead, plan.predicted - soonest + lead + end_window);
   }
-  keep_quiet(since + quiet);
+  keep_quiet(std::min(pace_.next(since, true), since + longest_quiet));
+  // What was asked for before the start would come too early, and keep the next one waiting. A comparison is
+  // finished all the same: it would not be begun again for long.
+  if (comparisons_ == 0) env_.bus->give_up_readings(settings_.node);
 }
 
 /// A motion by that plan, which was acknowledged at `since`.
@@ -213,8 +215,9 @@ Task<bool> Axis::follow(ActivityPtr activity, std::int64_t base, TimePoint since
     }
     if (!sample_) continue;
     const auto state = motion.look(reading_of(plan, base));
-    if (state == State::arrived) co_return true;
     if (state <= State::settling) continue;
+    pace_.came();
+    if (state == State::arrived) co_return true;
     end_motion(*activity, state);
     co_return false;
   }

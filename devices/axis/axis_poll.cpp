@@ -27,18 +27,28 @@ Task<> Axis::poll() {
     const auto began = env_.clock->now();
     if (!co_await poll_once(polling)) co_return;
     if (polling.woken || polling.failures > 0) continue;  // the bus's own timeouts pace the repetition
-    co_await look_for_drift();
-    if (works()) {
+    const bool worked = works();
+    if (worked) {
       // Whoever waits for this sample goes first: it may be the last one that is wanted.
       co_await let_others_run(env_.executor, *env_.clock);
       if (!link_.online() || link_.bus_loss() || chains_ > 0) continue;
     }
-    // At rest it counts from the reading itself: on a full line that came long after it was wanted.
-    const bool waited = !works() && env_.bus->start_turns() != nullptr;
-    const auto asked = sample_ && (polling.repeated || waited) ? sample_->asked_at : began;
-    const auto next = std::min(pace_.next(asked, works()), continuity_.latest(works()));
-    if (next > env_.clock->now()) co_await wake_.wait_until(next);
+    // What indexes rests for a moment only, just when its end was seen; but starts of others need the line
+    // more.
+    const auto* turns = env_.bus->start_turns();
+    if (!worked || turns == nullptr || turns->expected_wait() == Duration{}) co_await look_for_drift();
+    // A command that begins to wait for its turn meanwhile puts it off.
+    while (next_poll(polling, began) > env_.clock->now())
+      if (co_await wake_.wait_until(next_poll(polling, began))) break;
   }
+}
+
+/// When it is read next after a reading that was wanted at `began`.
+TimePoint Axis::next_poll(const Polling& polling, TimePoint began) const {
+  // At rest it counts from the reading itself: on a full line that came long after it was wanted.
+  const bool waited = !works() && env_.bus->start_turns() != nullptr;
+  const auto asked = sample_ && (polling.repeated || waited) ? sample_->asked_at : began;
+  return std::min(pace_.next(asked, works()), continuity_.latest(works()));
 }
 
 /// What was started is not read before. Where starts need no turns a reading costs no other axis anything.
@@ -51,6 +61,12 @@ bool Axis::keeps_quiet() const {
   const bool begun = activity_ && activity_->start.has_begun();
   return begun && !stop_.under_way() && !stop_.owed() &&
          pace_.state(env_.clock->now()) == PollPace::State::quiet;
+}
+
+void Axis::poll_for_end(TimePoint from, Duration longest) {
+  if (env_.bus->start_turns() == nullptr) return poll_fast(from, longest);
+  pace_.expect_end(from, longest);
+  wake();
 }
 
 void Axis::poll_fast(TimePoint from, Duration longest) {
@@ -103,6 +119,10 @@ Task<bool> Axis::poll_once(Polling& polling) {
     co_return true;
   }
   const bool unproven = continuity_.lost(env_.clock->now());
+  // It was given up, as something has begun since, or cut by a stop: its node has not failed to answer.
+  polling.woken = result.error().reason == Reason::superseded;
+  if (polling.woken && !unproven) co_return true;
+  if (polling.woken) result = fail(not_heard());
   if (result.error().reason == Reason::bus_down || ++polling.failures >= attempts_before_offline ||
       unproven) {
     go_offline(result.error());
@@ -111,10 +131,15 @@ Task<bool> Axis::poll_once(Polling& polling) {
   co_return true;
 }
 
+Error Axis::not_heard() const {
+  return error(Reason::no_reply, "the drive was not heard for too long, and is not asked at the moment",
+               "check power, wiring, address and baud rate of the node");
+}
+
 /// At rest the bus reads the state again and again, and tells what is new. Nothing: the axis was woken
 /// before.
 Task<Result<std::optional<DriveSample>>> Axis::next_sample(Polling& polling) {
-  if (works()) co_return co_await drive_->read_state(TransactionClass::moving_state);
+  if (works()) co_return co_await drive_->read_state(TransactionClass::moving_state, pace_.awaited_from());
   if (polling.failures > 0) co_return co_await drive_->read_state(TransactionClass::idle_state);
   StateWatch watch{.period = settings_.poll_idle};
   watch.goes_on = [this, &polling](const DriveSample& sample) {
@@ -168,8 +193,7 @@ void Axis::watch_continuity() {
   if (!link_.online()) return;
   const auto now = env_.clock->now();
   if (continuity_.lost(now) && env_.bus->holds_back(settings_.node)) {
-    go_offline(error(Reason::no_reply, "the drive was not heard for too long, and is not asked at the moment",
-                     "check power, wiring, address and baud rate of the node"));
+    go_offline(not_heard());
     return;
   }
   continuity_watch_ = env_.clock->call_at(continuity_.next_look(now), [this] { watch_continuity(); });

@@ -58,7 +58,8 @@ class Cia402Drive final : public Drive {
   [[nodiscard]] std::int64_t position_window() const override;
 
   // drive_state.cpp
-  Task<Result<DriveSample>> read_state(TransactionClass transaction_class) override;
+  using Drive::read_state;
+  Task<Result<DriveSample>> read_state(TransactionClass transaction_class, TimePoint awaited_from) override;
   [[nodiscard]] std::string link_note() const override;
   void on_attention(const std::function<void()>& handler) override { attention_ = handler; }
 

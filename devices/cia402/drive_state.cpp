@@ -143,7 +143,9 @@ Task<Result<DriveSample>> Cia402Drive::look(bool by_pdo, SdoOptions options) {
   co_return judge(*polled, false);
 }
 
-Task<Result<DriveSample>> Cia402Drive::read_state(TransactionClass transaction_class) {
+/// No node waits for another here, whatever is awaited.
+Task<Result<DriveSample>> Cia402Drive::read_state(TransactionClass transaction_class,
+                                                  TimePoint /*awaited_from*/) {
   const SdoOptions options{.transaction_class = transaction_class};
   // A chain that starts something does not wait for a PDO, unless the objects come later still.
   const bool slow = seen_.answer_time > slow_answer;

@@ -32,7 +32,8 @@ class YakoRtuDrive final : public Drive {
   // drive_connection.cpp
   Task<Result<DriveIdentity>> identify(TransactionClass transaction_class) override;
   Task<Result<void>> configure() override;
-  Task<Result<DriveSample>> read_state(TransactionClass transaction_class) override;
+  using Drive::read_state;
+  Task<Result<DriveSample>> read_state(TransactionClass transaction_class, TimePoint awaited_from) override;
   Task<Result<std::optional<DriveSample>>> watch_state(StateWatch watch) override;
   Task<Result<Drift>> check_drift(TransactionClass transaction_class) override;
   [[nodiscard]] bool moves_by_itself() const override;

@@ -142,8 +142,11 @@ DriveSample YakoRtuDrive::sample_of(std::span<const std::uint16_t> registers, Ti
   return sample;
 }
 
-Task<Result<DriveSample>> YakoRtuDrive::read_state(TransactionClass transaction_class) {
-  const auto answer = co_await node_.read(reg::mode, state_count, in(transaction_class));
+Task<Result<DriveSample>> YakoRtuDrive::read_state(TransactionClass transaction_class,
+                                                   TimePoint awaited_from) {
+  auto options = in(transaction_class);
+  options.awaited_from = awaited_from;
+  const auto answer = co_await node_.read(reg::mode, state_count, std::move(options));
   if (!answer) co_return failed(answer.error());
   co_return sample_of(answer->registers, answer->sent_at, answer->answered_at);
 }

@@ -125,6 +125,27 @@ TEST(M13, AStopEndsWhatATerminalStartedUnderHalt) {
   }
 }
 
+/// A stop cuts the reading that is under way: that no answer came shows all the same.
+TEST(M7, WhoStopsASilentNodeAgainAndAgainDoesNotKeepItOnline) {
+  for (const bool polled : {false, true})
+    for (const auto every : {3ms, 20ms}) {
+      SCOPED_TRACE(every.count());
+      CanRig rig({.polled = polled, .limits = false});
+      rig.ready();
+      rig.network.set_fault([](const can::Frame&) { return can::Network::Fault{.drop = true}; });
+      const auto since = rig.world.now();
+      while (rig.state()->link == LinkState::online && rig.world.now() < since + 20s) {
+        (void)rig.machine->submit("feeder", StopRequest{}, {.arrived = rig.world.now()});
+        rig.run(every);
+      }
+      EXPECT_EQ(rig.state()->link, LinkState::offline);
+      EXPECT_LE(rig.world.now() - since, 6s)
+          << "readings have the node between two stops without a reply only";
+      ASSERT_TRUE(rig.state()->link_error);
+      EXPECT_EQ(rig.state()->link_error->reason, Reason::no_reply) << to_string(*rig.state()->link_error);
+    }
+}
+
 /// A new edge lets go of the halt for a moment: only in velocity mode nothing is behind it.
 TEST(M13, WhereTheModeIsRefusedAStopStartsNothingThatAHaltSuspended) {
   for (const auto object : {0x6060, 0x6061})

@@ -1,0 +1,127 @@
+// M15: what is published of an axis that turns, and is stopped on its way, while all others of its line
+// index.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include "tests/rules/shared_line.hpp"
+#include "tests/support/indexing.hpp"
+#include "tests/support/rig.hpp"
+
+namespace axisd::test {
+namespace {
+
+using namespace std::chrono_literals;
+
+struct Beside {
+  int others;
+  bool one_frame;
+  bool endless;  ///< it turns by a velocity; else towards a target that is far away
+};
+
+double ms(Duration time) { return std::chrono::duration<double, std::milli>(time).count(); }
+
+class BesideIndexing : public testing::TestWithParam<Beside> {
+ protected:
+  BesideIndexing() : line_(GetParam().others + 1, 115200, adjust) {
+    for (int i = 1; i <= GetParam().others + 1; ++i) names_.push_back("a" + std::to_string(i));
+    IndexingAxes(line_.world, line_.machine(), names_).make_ready();
+    far_ = names_.back();
+    names_.pop_back();
+  }
+  static void adjust(AxisSettings& axis) {
+    axis.turnaround_max = 3ms;  // the drives take 2 ms: what is published is near what happens
+    if (GetParam().one_frame) axis.model_settings["start_in_one_frame"] = true;
+  }
+  [[nodiscard]] CommandPtr submit(const Action& action) {
+    auto command = line_.machine().submit(far_, action, {.arrived = line_.world.now()});
+    EXPECT_TRUE(command) << (command ? "" : to_string(command.error()));
+    return command.value_or(nullptr);
+  }
+
+  SharedLine line_;
+  std::vector<std::string> names_;
+  std::string far_;
+};
+
+TEST_P(BesideIndexing, IsReadAndStoppedAsPublished) {
+  IndexingAxes indexing(line_.world, line_.machine(), names_);
+  Duration latest_stop{};
+  for (int round = 0; round < 40; ++round) {
+    const auto move =
+        submit(GetParam().endless ? Action(MoveVelocityRequest{.velocity = 5})
+                                  : Action(MoveAbsoluteRequest{.position = 1000, .with = {.velocity = 5}}));
+    ASSERT_NE(move, nullptr);
+    indexing.run(300ms + round * 1700us);
+    ASSERT_EQ(move->value().state, CommandState::active) << describe(move->value());
+    const auto asked = line_.world.now();
+    const auto stop = submit(StopRequest{});
+    while (!stop->has_ended() && line_.world.now() < asked + 5s) indexing.run(1ms);
+    ASSERT_EQ(stop->value().state, CommandState::done) << describe(stop->value());
+    latest_stop = std::max<Duration>(latest_stop, line_.world.now() - asked);
+  }
+  EXPECT_EQ(indexing.failures, std::vector<std::string>{});
+  const auto report = line_.machine().budgets().front();
+  for (const auto& axis : report.axes)
+    EXPECT_LE(axis.observed.refresh_moving, axis.predicted.refresh_moving_all) << axis.predicted.axis;
+  const auto& far = report.axes.back();
+  // What is published counts retries and late answers, which are none here: of each other axis one reading
+  // and one start come first, and what was under way.
+  constexpr Duration period = 20ms, exchange = 8ms;
+  const auto shortest = period + (GetParam().others * (GetParam().one_frame ? 2 : 3) + 2) * exchange;
+  EXPECT_GT(far.observed.refresh_moving, Duration{});
+  EXPECT_LE(far.observed.refresh_moving, shortest);
+  fmt::print(
+      "{} axes index: read after {:.1f} ms at most, published {:.1f} ms; standstill {:.1f} ms, {:.1f} ms\n",
+      GetParam().others, ms(far.observed.refresh_moving), ms(far.predicted.refresh_moving_all),
+      ms(far.observed.standstill), ms(far.predicted.alone.standstill + far.deceleration));
+  EXPECT_GT(far.observed.standstill, Duration{});
+  EXPECT_LE(far.observed.standstill, far.predicted.alone.standstill + far.deceleration);
+  EXPECT_LE(latest_stop, far.predicted.alone.standstill + far.deceleration + 1ms)
+      << "as this looks each 1 ms";
+}
+
+std::vector<Beside> all_of(const std::vector<int>& others) {
+  std::vector<Beside> all;
+  for (const auto count : others)
+    for (const bool one_frame : {false, true})
+      for (const bool endless : {false, true}) all.push_back({count, one_frame, endless});
+  return all;
+}
+
+INSTANTIATE_TEST_SUITE_P(M15, BesideIndexing, testing::ValuesIn(all_of({1, 2, 3, 8})), [](const auto& info) {
+  const auto& one = info.param;
+  return fmt::format("{}{}{}", one.others, one.one_frame ? "InOneFrame" : "",
+                     one.endless ? "Velocity" : "Far");
+});
+
+/// A comparison with the configuration is finished though the axis starts meanwhile, again and again (M3): it
+/// would not be begun again for long.
+TEST(M3, WhatAnotherMasterChangedIsFoundThoughTheAxisIndexes) {
+  constexpr std::uint16_t x1_function = 0x0044;
+  for (const int count : {1, 2}) {
+    SCOPED_TRACE(count);
+    SharedLine line(count, 115200, [](AxisSettings& axis) {
+      axis.drift_check = 1s;
+      axis.inputs.push_back({.terminal = "X1", .function = "positive_limit"});
+    });
+    std::vector<std::string> names;
+    for (int i = 1; i <= count; ++i) names.push_back("a" + std::to_string(i));
+    IndexingAxes indexing(line.world, line.machine(), names, {.pause = 1ms});
+    indexing.make_ready();
+    indexing.run(3s);
+    EXPECT_EQ(indexing.failures, std::vector<std::string>{});
+    line.line->network().node(1)->poke(x1_function, 0);
+    const auto since = line.world.now();
+    const auto found = [&] { return !line.machine().find("a1")->snapshot()->drift.empty(); };
+    while (!found() && line.world.now() < since + 10s) indexing.run(100ms);
+    EXPECT_TRUE(found());
+    fmt::print("{} axes: found after {:.0f} ms\n", count, ms(line.world.now() - since));
+  }
+}
+
+}  // namespace
+}  // namespace axisd::test
