@@ -1,10 +1,11 @@
 // A full RS-485 line in virtual time: axes that index, each as soon as its last move is done. README.md says
 // what is measured. Ends with 1 where a command failed, or a published bound or a share was missed.
-//   bench_index PART [--moves N] [--stops N] [--rounds N] [--axes N ...] [--baud BAUD ...] [--drive
-//   KEY=VALUE]
+//   bench_index PART [--moves N] [--stops N] [--rounds N] [--pause MS] [--axes N ...] [--baud BAUD ...]
+//   [--drive KEY=VALUE]
 //     rates     moves per second, beside those of a raw script on the same line; shares; waits
 //     stops     stops on that line, beside those on a line that is full of readings
-//     done      from a drive's standstill to the end of its command
+//     done      from a drive's standstill to the end of its command; --pause: that clients take between two
+//               moves
 //     groups    start skew of 2 to 16 members, while all others of 16 axes index
 // --drive: a key of `drive:` of each axis; true and false are no text.
 #include <fmt/format.h>

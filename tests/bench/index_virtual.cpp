@@ -278,25 +278,28 @@ bool done(const Given& given) {
   fmt::print(
       "from a drive's standstill (seen each 0.1 ms) to its command's end, in transactions (readings of the\n"
       "state), of moves of 0.2 to 5 mm\n");
-  fmt::print("{:>6} {:>4} {:>15} {:>6} {:>9} {:>9} {:>9} {:>7}\n", "baud", "axes", "transaction, ms", "moves",
-             "median", "99 %", "longest", "failed");
+  fmt::print("{:>6} {:>4} {:>15} {:>6} {:>8} {:>9} {:>9} {:>9} {:>7}\n", "baud", "axes", "transaction, ms",
+             "moves", "moves/s", "median", "99 %", "longest", "failed");
   bool good = true;
   for (const auto baud : given.bauds)
     for (const auto axes : given.axes.empty() ? std::vector{4} : given.axes) {
       Line line(given, axes, baud);
-      test::IndexingAxes indexing(line.shared.world, line.shared.machine(), names(1, axes),
-                                  {.near = 0, .far = 2.5, .spread = 2.3});
+      test::IndexingAxes indexing(
+          line.shared.world, line.shared.machine(), names(1, axes),
+          {.near = 0, .far = 2.5, .spread = 2.3, .pause = given.numbers.at("--pause") * Duration(1ms)});
       Standing standing(line, indexing.count());
       Times taken;
       indexing.on_end = [&](std::size_t axis, const Command& move) {
         const auto since = standing.take(axis);
         if (since != TimePoint{} && move.state == CommandState::done) taken.add(line.now() - since);
       };
+      const auto begin = line.now();
       indexing.run_moves(given.numbers.at("--moves"));
+      const auto seconds = std::chrono::duration<double>(line.now() - begin).count();
       const auto unit = ms(reading(*line.shared.line, baud));
-      fmt::print("{:>6} {:>4} {:>15.2f} {:>6} {:>9.2f} {:>9.2f} {:>9.2f} {:>7}\n", baud, axes, unit,
-                 taken.all.size(), taken.at(0.5) / unit, taken.at(0.99) / unit, taken.at(1) / unit,
-                 indexing.failed);
+      fmt::print("{:>6} {:>4} {:>15.2f} {:>6} {:>8.1f} {:>9.2f} {:>9.2f} {:>9.2f} {:>7}\n", baud, axes, unit,
+                 taken.all.size(), static_cast<double>(indexing.all_done()) / seconds, taken.at(0.5) / unit,
+                 taken.at(0.99) / unit, taken.at(1) / unit, indexing.failed);
       for (const auto& failure : indexing.failures) fmt::print("  {}\n", failure);
       good = good && indexing.failed == 0;
     }

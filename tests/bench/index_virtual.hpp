@@ -11,7 +11,8 @@
 namespace axisd::bench {
 
 struct Given {
-  std::map<std::string, long, std::less<>> numbers{{"--moves", 2000}, {"--stops", 300}, {"--rounds", 5}};
+  std::map<std::string, long, std::less<>> numbers{
+      {"--moves", 2000}, {"--stops", 300}, {"--rounds", 5}, {"--pause", 0}};
   std::vector<int> axes;
   std::vector<int> bauds{115200, 19200};
   std::map<std::string, SettingValue> drive;
