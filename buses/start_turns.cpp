@@ -73,6 +73,11 @@ void StartTurns::give_to_next() {
   next->changed.notify_all();
 }
 
+int StartTurns::starts_of_turn() const {
+  const auto turn = std::ranges::find(places_, State::has_turn, &Place::state);
+  return turn == places_.end() ? 0 : (*turn)->starts;
+}
+
 std::size_t StartTurns::waiting() const {
   return static_cast<std::size_t>(std::ranges::count(places_, State::waiting, &Place::state));
 }

@@ -61,6 +61,8 @@ class StartTurns {
   [[nodiscard]] Duration expected_wait() const;
   /// Turns that have begun so far.
   [[nodiscard]] std::uint64_t begun() const { return begun_; }
+  /// Of the turn under way: 1, or how many of a group; 0: nobody has the turn.
+  [[nodiscard]] int starts_of_turn() const;
   /// Those that wait, without the one whose turn it is.
   [[nodiscard]] std::size_t waiting() const;
 

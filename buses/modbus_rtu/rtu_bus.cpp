@@ -227,33 +227,39 @@ void RtuBus::finish(std::span<const ExchangeResult> results) {
 
 /// What the order of the queue says; but whoever waits for the end of a motion goes before a start that can
 /// wait. Not where so many starts wait that the reading would be too old to be the proof for the next start
-/// of its axis (M6). Each turn to start gives way to one reading, and to a few that turns before it were
-/// spared: so much the published start counts.
+/// of its axis (M6), nor in the turn of a group (M22). Each turn to start gives way to one of what waits with
+/// the readings of moving axes, and to a few that turns before it were spared: so much the published start
+/// counts.
 TransactionPtr RtuBus::pop(TimePoint now) {
   const auto* const start = queue_.next_of(TransactionClass::motion);
   if (start == nullptr || !can_wait(*start, now)) return queue_.pop();
   if (start_turns_.expected_wait() + usual_start(settings_) > longest_proof) return queue_.pop();
+  if (start_turns_.starts_of_turn() > 1) return queue_.pop();
   const auto turns = start_turns_.begun();
   gave_way_ = std::max(gave_way_, turns - std::min(turns, most_that_go_first));
   if (gave_way_ == turns) return queue_.pop();
   // By then a reading would arrive at its drive.
   const auto asked = now + silence(settings_.serial()) + wire_time(settings_.serial(), size_of_read);
   auto next = queue_.pop(asked);
-  if (next->transaction_class == TransactionClass::moving_state) ++gave_way_;
+  if (next->transaction_class == TransactionClass::moving_state || next->patient) ++gave_way_;
   return next;
 }
 
-/// Its guard leaves time for a reading before it, and for another frame of its chain behind it, one of them
-/// answered as late as may be (M6). Members of a group start back to back (M22).
+/// It is part of one axis's start, and its guard leaves time for what would go before it, and for another
+/// frame of its chain behind it: the former and one of these answered as late as may be (M6). What no gate
+/// guards is a reading: that of a start, which is over soon, that of a group (M22), or that of a stop, whose
+/// bound counts none before it. Members of a group start back to back.
 bool RtuBus::can_wait(const Transaction& motion, TimePoint now) const {
   const auto& exchange = motion.exchange;
-  if (exchange.guard.with) return false;
+  if (!exchange.guard.gate || exchange.guard.with) return false;
   const auto until = std::min(exchange.deadline, exchange.guard.not_after);
   if (until == TimePoint::max()) return true;
   const auto& line = settings_.serial();
   const auto wire =
       wire_time(line, longest_reading + exchange.frame.size() + reply_size(exchange.request) + size_of_write);
-  return now + wire + 6 * silence(line) + turnaround_max(exchange.request.node) < until;
+  const auto* const first = queue_.next_of(TransactionClass::moving_state);
+  const auto answered = first == nullptr ? Duration{} : first->exchange.turnaround_max + reply_margin;
+  return now + wire + 6 * silence(line) + answered + turnaround_max(exchange.request.node) < until;
 }
 
 void RtuBus::arm_next() {

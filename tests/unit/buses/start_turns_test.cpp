@@ -51,6 +51,18 @@ TEST_F(StartTurnsTest, EachHasItsTurnInTheOrderOfAsking) {
   EXPECT_EQ(began, (std::vector<Duration>{0ms, 10ms, 20ms}));
 }
 
+TEST_F(StartTurnsTest, TellsOfHowManyStartsTheTurnIs) {
+  EXPECT_EQ(turns.starts_of_turn(), 0);
+  start('a', 10ms);
+  start('b', 10ms, 3);
+  world.run_for(5ms);
+  EXPECT_EQ(turns.starts_of_turn(), 1);
+  world.run_for(10ms);
+  EXPECT_EQ(turns.starts_of_turn(), 3);
+  world.run_for(10ms);
+  EXPECT_EQ(turns.starts_of_turn(), 0);
+}
+
 TEST_F(StartTurnsTest, AfterTheLongestTimeOfAStartTheNextBegins) {
   start('a', 2s);
   start('b', 10ms);

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <random>
-#include <utility>
 
 #include "bus_rig.hpp"
 
@@ -64,76 +63,6 @@ TEST(RtuBus, AReadingThatIsArmedIsHastenedThoughAStopTakesItsPlace) {
   std::vector<std::uint16_t> order;
   for (const auto& entry : rig.line->wire()) order.push_back(entry.address());
   EXPECT_EQ(order, (std::vector<std::uint16_t>{0x0028, 0x0004, 0x0005}));
-}
-
-/// So many turns to start begin, one after another.
-void take_turns(BusRig& rig, int count) {
-  const auto one = [](BusRig& of) -> Task<> {
-    const auto turn = of.bus->start_turns()->announce();
-    co_await of.bus->start_turns()->take(turn);
-  };
-  for (int i = 0; i < count; ++i) spawn(rig.world.executor(), one(rig), "turn");
-  rig.world.run_for(1us);
-}
-
-Request trigger_of(std::uint8_t node) {
-  return {.node = node, .function = Function::write_single_register, .address = 0x0027, .values = {5}};
-}
-
-/// Whoever waits for the end of a motion goes before the starts of others, as long as these can wait.
-TEST(RtuBus, AnAwaitedReadingGoesBeforeAStartThatCanWait) {
-  enum class Start : std::uint8_t { unbounded, in_good_time, short_of_time, of_a_group };
-  for (const auto start : {Start::unbounded, Start::in_good_time, Start::short_of_time, Start::of_a_group}) {
-    SCOPED_TRACE(std::to_underlying(start));
-    BusRig rig;
-    take_turns(rig, 2);
-    TransactionOptions motion{.transaction_class = TransactionClass::motion};
-    const auto gate = std::make_shared<AxisGate>();
-    motion.guard = {.gate = gate, .epoch = gate->epoch()};
-    const auto now = rig.world.now();
-    if (start == Start::in_good_time) motion.guard.not_after = now + 150ms;
-    if (start == Start::short_of_time) motion.guard.not_after = now + 40ms;
-    if (start == Start::of_a_group) motion.guard.with = std::make_shared<std::vector<MotionGuard>>();
-    rig.transact("under way", {.node = 2, .address = 0x0003, .count = 1}, {});
-    rig.world.run_for(1ms);
-    rig.transact("start", trigger_of(1), motion);
-    rig.transact("usual", {.node = 2, .address = 0x0004, .count = 1},
-                 {.transaction_class = TransactionClass::moving_state});
-    rig.transact("awaited", {.node = 2, .address = 0x0005, .count = 1},
-                 {.transaction_class = TransactionClass::moving_state, .awaited_from = now + 1ms});
-    rig.transact("not yet", {.node = 2, .address = 0x0006, .count = 1},
-                 {.transaction_class = TransactionClass::moving_state, .awaited_from = now + 10s});
-    rig.world.run_for(200ms);
-    std::vector<std::uint16_t> order;
-    for (const auto& entry : rig.line->wire()) order.push_back(entry.address());
-    const bool first = start == Start::unbounded || start == Start::in_good_time;
-    EXPECT_EQ(order, first ? (std::vector<std::uint16_t>{0x0003, 0x0004, 0x0005, 0x0027, 0x0006})
-                           : (std::vector<std::uint16_t>{0x0003, 0x0027, 0x0004, 0x0005, 0x0006}));
-  }
-}
-
-/// One reading for each turn, and at most as many as the published start counts where turns were spared.
-TEST(RtuBus, AStartGivesWayToNoMoreThanItsShare) {
-  for (const auto& [turns, first] :
-       {std::pair{0, 0}, {1, 1}, {3, 3}, {50, static_cast<int>(most_that_go_first)}}) {
-    SCOPED_TRACE(turns);
-    BusRig rig;
-    take_turns(rig, turns);
-    rig.transact("under way", {.node = 2, .address = 0x0003, .count = 1}, {});
-    rig.world.run_for(1ms);
-    rig.transact("start", trigger_of(1), {.transaction_class = TransactionClass::motion});
-    for (std::uint16_t i = 0; i < 10; ++i)
-      rig.transact("awaited" + std::to_string(i),
-                   {.node = 2, .address = static_cast<std::uint16_t>(4 + i), .count = 1},
-                   {.transaction_class = TransactionClass::moving_state, .awaited_from = rig.world.now()});
-    rig.world.run_for(300ms);
-    const auto& wire = rig.line->wire();
-    const auto start =
-        std::ranges::find_if(wire, [](const auto& entry) { return entry.address() == 0x0027; });
-    ASSERT_NE(start, wire.end());
-    EXPECT_EQ(start - wire.begin() - 1, first);
-    EXPECT_EQ(wire.size(), 12U);
-  }
 }
 
 /// As before, where another read has to go out before it: the first one was lost.
