@@ -137,7 +137,8 @@ void RtuBus::purge_superseded(std::uint8_t /*node*/, const AxisGate& gate) {
 void RtuBus::give_up_readings(std::uint8_t node) {
   const auto now = clock_->now();
   if (!recall(node))
-    for (const auto& one : round_) one->given_up = one->given_up || one->exchange.request.node == node;
+    for (const auto& one : round_)
+      one->given_up = one->given_up || (one->exchange.request.node == node && !is_of_others(*one));
   for (auto& reading : queue_.take_reads(node, TransactionClass::idle_state))
     end(std::move(reading), not_sent(Verdict::superseded, now));
   if (auto* const watch = watch_of(node)) watch->end();
@@ -171,7 +172,7 @@ Duration RtuBus::turnaround_max(std::uint8_t node) const {
 /// way may have to be followed by what it was sent for (resync_before).
 void RtuBus::hasten(std::uint8_t node, TransactionClass to) {
   const auto concerned = [&](const TransactionPtr& one) {
-    return one->exchange.request.node == node && one->transaction_class > to;
+    return one->exchange.request.node == node && is_of_axis(*one) && one->transaction_class > to;
   };
   const bool revoked = std::ranges::any_of(round_, concerned) && take_back();
   for (const auto& one : round_)
@@ -233,8 +234,8 @@ void RtuBus::finish(std::span<const ExchangeResult> results) {
 TransactionPtr RtuBus::pop(TimePoint now) {
   const auto* const start = queue_.next_of(TransactionClass::motion);
   if (start == nullptr || !can_wait(*start, now)) return queue_.pop();
-  if (start_turns_.expected_wait() + usual_start(settings_) > longest_proof) return queue_.pop();
   if (start_turns_.starts_of_turn() > 1) return queue_.pop();
+  if (start_turns_.expected_wait() + usual_start(settings_) > longest_proof) return queue_.pop();
   const auto turns = start_turns_.begun();
   gave_way_ = std::max(gave_way_, turns - std::min(turns, most_that_go_first));
   if (gave_way_ == turns) return queue_.pop();
@@ -355,6 +356,7 @@ TransactionPtr RtuBus::resync_before(TransactionPtr waiting) {
   resync->transaction_class = waiting->transaction_class;
   resync->sequence = waiting->sequence;
   resync->reserved = waiting->reserved;
+  resync->also_of_others = waiting->also_of_others;
   resync->queued_at = waiting->queued_at;
   resync->released_at = waiting->released_at;
   resync->resync = true;

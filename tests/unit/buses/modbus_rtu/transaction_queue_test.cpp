@@ -124,6 +124,7 @@ TEST(TransactionQueue, EqualReadsMergeAndBothAreTold) {
   queue.push(std::move(high));
   queue.push(read_of(1, Class::parameters, TimePoint::max(), 2));  // another node
   ASSERT_EQ(queue.size(), 2U);
+  EXPECT_TRUE(queue.take_reads(1, Class::idle_state).empty()) << "its axis is not the only one that waits";
   const auto merged = queue.pop();
   EXPECT_EQ(merged->transaction_class, Class::moving_state);
   EXPECT_EQ(merged->exchange.deadline, TimePoint{} + 2s);
@@ -278,6 +279,27 @@ TEST(TransactionQueue, ReadsOfOneNodeAreTakenOutDownToAClassHeldOrNot) {
   EXPECT_EQ(queue.held_nodes(), (std::vector<std::uint8_t>{1, 2}));
   queue.release(1, {});
   EXPECT_EQ(drain(queue), (std::vector<std::uint16_t>{6, 3, 4}));
+}
+
+/// What somebody else reads of a drive is neither hurried nor ended because its axis starts or stops.
+TEST(TransactionQueue, WhatOthersAskOfANodeIsNotHastened) {
+  TransactionQueue queue;
+  queue.push(read_of(1, Class::parameters));
+  queue.push(read_of(2, Class::scan));
+  queue.push(read_of(3, Class::idle_state));
+  queue.hold(read_of(4, Class::parameters));
+  queue.hasten(1, Class::moving_state);
+  EXPECT_EQ(queue.size(Class::moving_state), 1U);
+  EXPECT_EQ(queue.size(Class::parameters), 1U);
+  EXPECT_EQ(queue.size(Class::scan), 1U);
+  queue.push(read_of(5, Class::parameters));
+  queue.push(read_of(5, Class::idle_state));  // joins it
+  queue.hasten(1, Class::moving_state);
+  EXPECT_EQ(queue.size(Class::moving_state), 2U) << "its axis waits for it, too";
+  EXPECT_EQ(queue.take_reads(1, Class::idle_state).size(), 1U);
+  EXPECT_EQ(queue.pop()->exchange.request.address, 5);
+  queue.release(1, {});
+  EXPECT_EQ(drain(queue), (std::vector<std::uint16_t>{1, 4, 2}));
 }
 
 TEST(TransactionQueue, PutBackKeepsItsPlace) {
