@@ -224,7 +224,7 @@ Task<Result<void>> YakoRtuDrive::start_once(MotionBlock block, std::optional<Hom
   auto fresh = motion;
   fresh.guard.not_after = std::min(guard.not_after, *proven + setup_.reboot_guard);
   if (homing) {
-    if (const auto prepared = co_await prepare_homing(*homing, motion); !prepared) co_return prepared;
+    if (const auto prepared = co_await prepare_homing(*homing, fresh); !prepared) co_return prepared;
   } else if (terminal_move_mode_ && may_start_in_one_frame()) {
     co_return co_await start_in_one_frame(distinct(block), trigger, std::move(fresh));
   } else if (const auto written = co_await write_canary(distinct(block), fresh); !written) {

@@ -277,6 +277,21 @@ TEST(M06, RebootGuardExpiresTheTrigger) {
   EXPECT_EQ(rig.triggers(), 1);
 }
 
+/// The block of homing is part of the chain: it is no older than its trigger.
+TEST(M06, RebootGuardExpiresTheBlockOfHoming) {
+  constexpr std::uint16_t homing_mode = 0x0031, homing_speed = 0x0032;
+  Rig rig({.adjust = [](AxisSettings& axis) { axis.reboot_guard = 30ms; }});
+  rig.ready();
+  rig.drive->poke(homing_speed, 77);  // so that it has to be written
+  rig.fault({.kind = FaultKind::delay_reply, .function = 0x03, .count = -1, .delay = 13ms});
+  rig.line->forget_wire();
+  const auto home = rig.complete(HomeRequest{});
+  ASSERT_TRUE(home.cause);
+  EXPECT_EQ(home.cause->reason, Reason::expired) << describe(home);
+  EXPECT_EQ(rig.writes_of(homing_mode), 0);
+  EXPECT_EQ(rig.writes_of(0x0030), 0);
+}
+
 TEST(M07, TheCanaryIsReadEverySecond) {
   for (const auto idle :
        {1ms, 20ms, 100ms, 200ms, 333ms, 500ms, 700ms, 1000ms, 1200ms, 2000ms, 5000ms, 10000ms}) {
