@@ -122,6 +122,7 @@ Task<bool> Axis::poll_once(Polling& polling) {
   // It was given up, as something has begun since, or cut by a stop: its node has not failed to answer.
   polling.woken = result.error().reason == Reason::superseded;
   if (polling.woken && !unproven) co_return true;
+  if (!polling.woken) pace_.not_answered();
   if (polling.woken) result = fail(not_heard());
   if (result.error().reason == Reason::bus_down || ++polling.failures >= attempts_before_offline ||
       unproven) {

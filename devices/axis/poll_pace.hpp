@@ -51,6 +51,8 @@ class PollPace {
     awaited_from_ = TimePoint::max();
     delay_ = moving ? std::min(delay_ + later, longest_delay) : std::max(delay_ - sooner, Duration{});
   }
+  /// The drive did not answer one: others go before it now.
+  void not_answered() { awaited_from_ = TimePoint::max(); }
   /// From then on the next reading is likely to be the one; TimePoint::max(): no more than others.
   [[nodiscard]] TimePoint awaited_from() const { return awaited_from_; }
   void keep_quiet(TimePoint until) { quiet_until_ = until; }

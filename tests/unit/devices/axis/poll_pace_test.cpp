@@ -47,6 +47,10 @@ TEST(PollPace, TheFirstReadingAtTheEndOfAMotionIsAwaited) {
   EXPECT_EQ(fast.awaited_from(), now);
   fast.seen(now, false);
   EXPECT_EQ(fast.awaited_from(), TimePoint::max());
+  fast.expect_end(now, 100ms);
+  fast.not_answered();
+  EXPECT_EQ(fast.awaited_from(), TimePoint::max()) << "a silent drive keeps nobody waiting again";
+  EXPECT_EQ(fast.state(now), State::fast);
 }
 
 TEST(PollPace, NothingIsReadJustBeforeTheEnd) {
