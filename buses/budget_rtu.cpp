@@ -116,18 +116,20 @@ Duration Analysis::reservations(std::int64_t overtaking) const {
 }
 
 /// From the queue to the first byte, in class moving_state, whose order is that of arrival. Each other axis
-/// has at most one exchange before it, and one chain: it starts again only when it was read behind this one.
-/// Silent nodes may have to be stopped again.
+/// has at most one exchange before it, also one that was hastened, and one chain, which begins with a
+/// reading: it starts again only when it was read behind this one. Silent nodes may have to be stopped again.
 /// `late`: what silent ones among them cost more than ones that answer late.
 Duration Analysis::wait_moving(int moving, int starting, Duration late) const {
   const auto others = static_cast<std::size_t>(std::max(0, moving - 1));
   const auto chains = std::min(others, static_cast<std::size_t>(starting));
   const auto poll = [this](const AxisDemand& axis) { return cost(axis.set.state, axis); };
   const auto chain = [this](const AxisDemand& axis) {
-    return cost(axis.set.start, axis) + cost(axis.set.state, axis);
+    const auto state = cost(axis.set.state, axis);
+    return 2 * state + cost(axis.set.start, axis) +
+           std::max(Duration{}, cost(axis.set.longest, axis) - state);
   };
   const auto overtaking = static_cast<std::int64_t>(others - chains) +
-                          static_cast<std::int64_t>(chains) * (longest_chain_ + 1) + 1;
+                          static_cast<std::int64_t>(chains) * (longest_chain_ + 2) + 1;
   return in_flight_ + late_ + dearest(chains, chain) + dearest(others - chains, poll) + late +
          reservations(overtaking) + silence(demand_.line);
 }
