@@ -205,8 +205,9 @@ class Axis {
 
   // axis_drift.cpp
   [[nodiscard]] bool drift_is_next() const;
-  Task<> look_for_drift();
-  Task<Result<void>> check_for_drift();
+  void look_for_drift();
+  Task<> compare();
+  Task<Result<void>> check_for_drift(TransactionClass priority);
   void set_drift(const std::string& text);
 
   // axis_journal.cpp: commands over restarts of the daemon
@@ -489,7 +490,6 @@ class Axis {
   Signal wake_;     ///< the poll loop has something to look at
   Signal stopped_;  ///< the stop sequence ended
   int chains_ = 0;
-  int comparisons_ = 0;             ///< of the drive's configuration, that are being read
   int sequences_ = 0;               ///< coroutines that still run
   std::uint64_t accept_epoch_ = 0;  ///< of the request being accepted: a stop raised meanwhile makes it old
 

@@ -13,21 +13,29 @@ bool Axis::drift_is_next() const {
   return maintenance_.expired() && drift_.is_next(now, continuity_.just_proven(now));
 }
 
-/// Reads the terminals' functions again now and then, at rest: what another master changed is applied again
-/// once the drive is released, and forbids motion until then.
-Task<> Axis::look_for_drift() {
-  if (!link_.online() || busy()) co_return;
-  if (drift_is_next() && !co_await check_for_drift()) co_return;
+/// Reads the terminals' functions again now and then, begun at rest: what another master changed is applied
+/// again once the drive is released, and forbids motion until then. Nobody waits for it: the state is read
+/// meanwhile as ever, also of a motion that begins.
+void Axis::look_for_drift() {
+  if (!link_.online() || busy()) return;
+  if (drift_is_next()) launch(compare(), "comparison");
   const bool free = link_.online() && !busy() && maintenance_.expired();
   if (drift_.drifted() && free && sample_ && !sample_->enabled) reconfigure(drift_.text(), false);
 }
 
-Task<Result<void>> Axis::check_for_drift() {
-  drift_.checked(env_.clock->now());
-  ++comparisons_;
-  const auto drift = co_await drive_->check_drift(TransactionClass::idle_state);
-  --comparisons_;
+/// In a class that no start or stop ends or hastens: it comes to its end however often the axis moves.
+Task<> Axis::compare() {
+  co_await check_for_drift(TransactionClass::parameters);
+  if (drift_.drifted()) wake();
+}
+
+Task<Result<void>> Axis::check_for_drift(TransactionClass priority) {
+  const auto number = drift_.begin(env_.clock->now());
+  const auto drift = co_await drive_->check_drift(priority);
+  const bool counts = drift_.end(number);
   if (!drift) co_return fail(drift.error());
+  // It was configured meanwhile, or connected anew: what was read before says nothing.
+  if (!counts) co_return Result<void>{};
   if (drift->scale_changed) lose_trust();
   set_drift(drift->text);
   // A motion that was accepted while this was being read goes on without what it relies on.

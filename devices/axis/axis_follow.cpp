@@ -174,9 +174,8 @@ void Axis::expect_end(const Plan& plan, std::int64_t base, TimePoint since) {
     poll_for_end(since + soonest - lead, plan.predicted - soonest + lead + end_window);
   }
   keep_quiet(std::min(pace_.next(since, true), since + longest_quiet));
-  // What was asked for before the start would come too early, and keep the next one waiting. A comparison is
-  // finished all the same: it would not be begun again for long.
-  if (comparisons_ == 0) env_.bus->give_up_readings(settings_.node);
+  // What the poll loop asked for before the start would come too early, and keep the next one waiting.
+  env_.bus->give_up_readings(settings_.node);
 }
 
 /// A motion by that plan, which was acknowledged at `since`.

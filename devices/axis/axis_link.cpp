@@ -187,7 +187,7 @@ Task<Result<void>> Axis::prove_or_configure() {
   }
   if (!link_.is_configured()) {
     if (const auto configured = co_await configure(restorable); !configured) co_return configured;
-  } else if (const auto checked = co_await check_for_drift(); !checked) {
+  } else if (const auto checked = co_await check_for_drift(TransactionClass::idle_state); !checked) {
     co_return checked;  // somebody may have changed it while it was out of reach
   }
   const auto sample = co_await drive_->read_state(TransactionClass::idle_state);
@@ -245,7 +245,7 @@ Task<Result<void>> Axis::configure(std::optional<OffsetRecord> restorable) {
   link_.configured();
   continuity_.proven(env_.clock->now());
   earlier_.tried();
-  drift_.checked(env_.clock->now());
+  drift_.applied(env_.clock->now());
   set_drift({});
   if (restorable) {
     tracker_.restore(restorable->offset_pulses);

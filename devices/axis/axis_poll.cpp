@@ -27,16 +27,13 @@ Task<> Axis::poll() {
     const auto began = env_.clock->now();
     if (!co_await poll_once(polling)) co_return;
     if (polling.woken || polling.failures > 0) continue;  // the bus's own timeouts pace the repetition
-    const bool worked = works();
-    if (worked) {
+    if (works()) {
       // Whoever waits for this sample goes first: it may be the last one that is wanted.
       co_await let_others_run(env_.executor, *env_.clock);
       if (!link_.online() || link_.bus_loss() || chains_ > 0) continue;
     }
-    // What indexes rests for a moment only, just when its end was seen; but starts of others need the line
-    // more.
-    const auto* turns = env_.bus->start_turns();
-    if (!worked || turns == nullptr || turns->expected_wait() == Duration{}) co_await look_for_drift();
+    // An axis that indexes rests for a moment only, just when its end was seen.
+    look_for_drift();
     // A command that begins to wait for its turn meanwhile puts it off.
     while (next_poll(polling, began) > env_.clock->now())
       if (co_await wake_.wait_until(next_poll(polling, began))) break;

@@ -14,6 +14,8 @@ namespace axisd {
 ///
 ///   as_configured -- found(), something --> drifted
 ///   drifted -- found(), nothing ----------> as_configured
+///
+/// Beside that a comparison may be under way, from begin() to its end(): the newest alone counts.
 class DriftWatch {
  public:
   enum class State : std::uint8_t { as_configured, drifted };
@@ -21,8 +23,23 @@ class DriftWatch {
   /// `period`: from one comparison to the next.
   explicit DriftWatch(Duration period) : period_(period) {}
 
-  /// A comparison has begun, or the configuration was applied.
-  void checked(TimePoint at) { checked_ = at; }
+  /// A comparison begins; its number. What is still being compared counts no more.
+  std::uint64_t begin(TimePoint at) {
+    checked_ = at;
+    under_way_ = ++last_;
+    return last_;
+  }
+  /// That comparison has ended. False: it did not count any more.
+  bool end(std::uint64_t number) {
+    if (under_way_ != number) return false;
+    under_way_ = none;
+    return true;
+  }
+  /// The configuration was applied.
+  void applied(TimePoint at) {
+    checked_ = at;
+    under_way_ = none;
+  }
   /// What the drive no longer holds as configured; empty: nothing. True: that is news.
   bool found(const std::string& text) {
     if (text == text_) return false;
@@ -33,7 +50,7 @@ class DriftWatch {
   /// would keep the next proof waiting, so it waits for one, but not for ever.
   [[nodiscard]] bool is_next(TimePoint now, bool just_proven) const {
     const auto due = checked_ + period_;
-    return now >= due && (just_proven || now >= due + 2 * continuity_period);
+    return under_way_ == none && now >= due && (just_proven || now >= due + 2 * continuity_period);
   }
 
   [[nodiscard]] State state() const { return text_.empty() ? State::as_configured : State::drifted; }
@@ -41,8 +58,11 @@ class DriftWatch {
   [[nodiscard]] const std::string& text() const { return text_; }
 
  private:
+  static constexpr std::uint64_t none = 0;
+
   Duration period_;
   TimePoint checked_{};
+  std::uint64_t last_ = none, under_way_ = none;  ///< numbers of comparisons
   std::string text_;
 };
 

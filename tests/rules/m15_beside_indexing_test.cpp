@@ -4,9 +4,13 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <optional>
+#include <random>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "daemon/core/drive_access_service.hpp"
 #include "tests/rules/shared_line.hpp"
 #include "tests/support/indexing.hpp"
 #include "tests/support/rig.hpp"
@@ -98,26 +102,116 @@ INSTANTIATE_TEST_SUITE_P(M15, BesideIndexing, testing::ValuesIn(all_of({1, 2, 3,
                      one.endless ? "Velocity" : "Far");
 });
 
-/// A comparison with the configuration is finished though the axis starts meanwhile, again and again (M3): it
-/// would not be begun again for long.
-TEST(M3, WhatAnotherMasterChangedIsFoundThoughTheAxisIndexes) {
-  constexpr std::uint16_t x1_function = 0x0044;
-  for (const int count : {1, 2}) {
-    SCOPED_TRACE(count);
-    SharedLine line(count, 115200, [](AxisSettings& axis) {
-      axis.drift_check = 1s;
-      axis.inputs.push_back({.terminal = "X1", .function = "positive_limit"});
-    });
+/// A line of axes that index, each compared with its configuration as often as that can be.
+struct ComparedAxes {
+  explicit ComparedAxes(int count) : line(count, 115200, adjust) {
     std::vector<std::string> names;
     for (int i = 1; i <= count; ++i) names.push_back("a" + std::to_string(i));
-    IndexingAxes indexing(line.world, line.machine(), names, {.pause = 1ms});
-    indexing.make_ready();
+    axes.emplace(line.world, line.machine(), std::move(names), IndexingAxes::Way{.pause = 1ms});
+    axes->make_ready();
+  }
+  static void adjust(AxisSettings& axis) {
+    axis.turnaround_max = 3ms;
+    axis.drift_check = 1s;
+    axis.inputs.push_back({.terminal = "X1", .function = "positive_limit"});
+  }
+  SharedLine line;
+  std::optional<IndexingAxes> axes;
+};
+
+/// Looks at the drives themselves: since when each stands.
+class Standing {
+ public:
+  Standing(SharedLine& line, std::size_t axes) : line_(&line), moving_(axes), since_(axes) { look(); }
+  Standing(const Standing&) = delete;
+  /// Since the end of the motion that was seen last; nothing: none was. Once.
+  std::optional<TimePoint> take(std::size_t axis) { return std::exchange(since_.at(axis), std::nullopt); }
+
+ private:
+  void look() {
+    auto& network = line_->line->network();
+    network.advance(line_->world.now());
+    for (std::size_t i = 0; i < moving_.size(); ++i) {
+      const bool moves = network.node(static_cast<std::uint8_t>(i + 1))->shaft_moving();
+      if (moving_[i] != 0 && !moves) since_[i] = line_->world.now();
+      moving_[i] = moves ? 1 : 0;
+    }
+    next_ = line_->world.clock().call_at(line_->world.now() + 500us, [this] { look(); });
+  }
+  SharedLine* line_;
+  std::vector<char> moving_;
+  std::vector<std::optional<TimePoint>> since_;
+  Clock::Timer next_;
+};
+
+/// What a comparison still has to read keeps nobody from seeing how a motion that has begun since goes on.
+TEST(M15, AComparisonKeepsNoMotionFromBeingSeen) {
+  constexpr std::size_t count = 8;
+  ComparedAxes compared(count);
+  auto& world = compared.line.world;
+  auto& indexing = *compared.axes;
+  Standing standing(compared.line, count);
+  Duration latest_done{};
+  indexing.on_end = [&](std::size_t axis, const Command& move) {
+    const auto since = standing.take(axis);
+    const bool of_it = since && world.clock().wall(*since) >= move.accepted_at;
+    if (of_it && move.state == CommandState::done)
+      latest_done = std::max<Duration>(latest_done, world.now() - *since);
+  };
+  std::mt19937_64 random(1);
+  for (int round = 0; round < 150; ++round) {
+    indexing.run(150ms + Duration(random() % Duration(100ms).count()));
+    indexing.stop(random() % count);
+  }
+  indexing.run(1s);
+  EXPECT_EQ(indexing.failures, std::vector<std::string>{});
+  Duration longest_standstill{};
+  const auto report = compared.line.machine().budgets().front();
+  for (const auto& axis : report.axes) {
+    SCOPED_TRACE(axis.predicted.axis);
+    EXPECT_LE(axis.observed.refresh_moving, axis.predicted.refresh_moving_all);
+    EXPECT_GT(axis.observed.standstill, Duration{});
+    EXPECT_LE(axis.observed.standstill, axis.predicted.alone.standstill + axis.deceleration);
+    longest_standstill = std::max(longest_standstill, axis.observed.standstill);
+    // The reading that shows it, and its answer.
+    EXPECT_LE(latest_done, axis.predicted.refresh_moving_all + 10ms);
+  }
+  const auto& first = report.axes.front();
+  fmt::print("done {:.1f} ms after the end, published {:.1f} ms; standstill {:.1f} ms, {:.1f} ms\n",
+             ms(latest_done), ms(first.predicted.refresh_moving_all), ms(longest_standstill),
+             ms(first.predicted.alone.standstill + first.deceleration));
+}
+
+/// What a client reads of a drive is not ended by its starts.
+TEST(M32, ParametersAreReadThoughTheAxisIndexes) {
+  ComparedAxes compared(4);
+  auto& line = compared.line;
+  core::DriveAccessService drives(line.world.executor(), line.world.clock(), line.machine());
+  for (int i = 0; i < 100; ++i) {
+    std::optional<Result<std::vector<ParameterValue>>> found;
+    drives.read_parameters("a1", {0x0011, 0x0034, 0x0044}, [&](auto result) { found = std::move(result); });
+    const auto since = line.world.now();
+    while (!found && line.world.now() < since + 10s) compared.axes->run(3ms);
+    ASSERT_TRUE(found);
+    ASSERT_TRUE(*found) << to_string(found->error());
+  }
+  EXPECT_EQ(compared.axes->failures, std::vector<std::string>{});
+}
+
+/// A comparison with the configuration comes to its end though the axis starts meanwhile, again and again.
+TEST(M3, WhatAnotherMasterChangedIsFoundThoughTheAxisIndexes) {
+  constexpr std::uint16_t x1_function = 0x0044;
+  for (const int count : {1, 4, 8}) {
+    SCOPED_TRACE(count);
+    ComparedAxes compared(count);
+    auto& line = compared.line;
+    auto& indexing = *compared.axes;
     indexing.run(3s);
     EXPECT_EQ(indexing.failures, std::vector<std::string>{});
     line.line->network().node(1)->poke(x1_function, 0);
     const auto since = line.world.now();
     const auto found = [&] { return !line.machine().find("a1")->snapshot()->drift.empty(); };
-    while (!found() && line.world.now() < since + 10s) indexing.run(100ms);
+    while (!found() && line.world.now() < since + 30s) indexing.run(100ms);
     EXPECT_TRUE(found());
     fmt::print("{} axes: found after {:.0f} ms\n", count, ms(line.world.now() - since));
   }

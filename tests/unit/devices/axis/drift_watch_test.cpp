@@ -26,12 +26,28 @@ TEST(DriftWatch, WhatIsFoundIsNewsOnce) {
 
 TEST(DriftWatch, AComparisonWaitsForAProofButNotForEver) {
   DriftWatch drift(period);
-  drift.checked(checked);
+  drift.applied(checked);
   EXPECT_FALSE(drift.is_next(checked + period - 1ms, true));
   EXPECT_TRUE(drift.is_next(checked + period, true));
   EXPECT_FALSE(drift.is_next(checked + period, false));
   EXPECT_FALSE(drift.is_next(checked + period + 2 * continuity_period - 1ms, false));
   EXPECT_TRUE(drift.is_next(checked + period + 2 * continuity_period, false));
+}
+
+TEST(DriftWatch, TheNewestComparisonCounts) {
+  DriftWatch drift(period);
+  const auto first = drift.begin(checked);
+  EXPECT_FALSE(drift.is_next(checked + 10 * period, true)) << "it is under way";
+  const auto second = drift.begin(checked + 1s);
+  EXPECT_FALSE(drift.end(first));
+  EXPECT_FALSE(drift.is_next(checked + 10 * period, true));
+  EXPECT_TRUE(drift.end(second));
+  EXPECT_FALSE(drift.end(second));
+  EXPECT_FALSE(drift.is_next(checked + period, true)) << "from when it began";
+  EXPECT_TRUE(drift.is_next(checked + 1s + period, true));
+  const auto third = drift.begin(checked);
+  drift.applied(checked);
+  EXPECT_FALSE(drift.end(third)) << "the drive was configured meanwhile";
 }
 
 }  // namespace
