@@ -42,13 +42,14 @@ class Bus {
   virtual void purge_superseded(std::uint8_t node, const AxisGate& gate) = 0;
   /// The axis of `node` is offline, or is stopped again while it does not answer, or has started since:
   /// readings for it that wait end as superseded, so that what it is owed now need not wait for them. Not
-  /// those of class `parameters` and below, which others asked for.
+  /// those of class `parameters` and below, unless they were hastened, nor what others asked for
+  /// (TransactionOptions::of_others).
   virtual void give_up_readings(std::uint8_t /*node*/) {}
   /// A state that the bus reads again and again by itself, because it stays the same, is told with the next
   /// reading, or at once that there is none (Drive::watch_state).
   virtual void end_repetition(std::uint8_t /*node*/) {}
   /// An axis became busy: what it already waits for becomes as urgent as what it asks for now. Not what
-  /// others asked for, in class `parameters` and below.
+  /// others asked for.
   virtual void hasten(std::uint8_t node, TransactionClass to) = 0;
   /// Requests to this node wait for their turn, because it does not answer, or because nobody could tell the
   /// answer to a reading from a late one.

@@ -30,6 +30,9 @@ struct TransactionOptions {
   /// Of a reading in class moving_state on an RS-485 line: from then on its answer is likely to end a
   /// command. Until it has gone out its class goes before starts then, as far as these can wait.
   TimePoint awaited_from = TimePoint::max();
+  /// Of a request to the drive of an axis: others than the axis wait for it. Whether the axis starts or stops
+  /// neither hastens nor ends it, and no reading of the axis joins it.
+  bool of_others = false;
   /// Of a stop that was sent in vain before: while its node does not answer anything, it is repeated as
   /// seldom as the node is probed.
   bool patient = false;

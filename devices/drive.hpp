@@ -272,8 +272,9 @@ class Drive {
   /// When the last stop frame that is known to have gone out had done so: its last byte or bit.
   [[nodiscard]] virtual std::optional<TimePoint> stop_sent_at() const { return std::nullopt; }
 
-  /// Reads back what the configuration owns among terminals and scale.
-  virtual Task<Result<Drift>> check_drift(TransactionClass transaction_class) = 0;
+  /// Reads back what the configuration owns among terminals and scale. `options`: of each request. Error
+  /// `superseded`: the gate of their guard was raised.
+  virtual Task<Result<Drift>> check_drift(TransactionOptions options) = 0;
   /// The drive takes its motion from elsewhere, as it is configured (pulse inputs): axisd watches it.
   [[nodiscard]] virtual bool moves_by_itself() const = 0;
   /// What configure() and others saved to EEPROM since the last call.

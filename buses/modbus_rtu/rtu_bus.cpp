@@ -98,6 +98,7 @@ Result<TransactionPtr> RtuBus::prepare(Request request, TransactionOptions optio
   transaction->transaction_class = options.transaction_class;
   transaction->patient = options.patient;
   transaction->awaited_from = options.awaited_from;
+  transaction->of_others = options.of_others;
   transaction->queued_at = clock_->now();
   transaction->exchange = exchange_for(std::move(request), *frame, std::move(options));
   return transaction;
@@ -138,7 +139,7 @@ void RtuBus::give_up_readings(std::uint8_t node) {
   const auto now = clock_->now();
   if (!recall(node))
     for (const auto& one : round_)
-      one->given_up = one->given_up || (one->exchange.request.node == node && !is_of_others(*one));
+      one->given_up = one->given_up || (one->exchange.request.node == node && !one->of_others);
   for (auto& reading : queue_.take_reads(node, TransactionClass::idle_state))
     end(std::move(reading), not_sent(Verdict::superseded, now));
   if (auto* const watch = watch_of(node)) watch->end();
@@ -172,7 +173,7 @@ Duration RtuBus::turnaround_max(std::uint8_t node) const {
 /// way may have to be followed by what it was sent for (resync_before).
 void RtuBus::hasten(std::uint8_t node, TransactionClass to) {
   const auto concerned = [&](const TransactionPtr& one) {
-    return one->exchange.request.node == node && is_of_axis(*one) && one->transaction_class > to;
+    return one->exchange.request.node == node && !one->of_others && one->transaction_class > to;
   };
   const bool revoked = std::ranges::any_of(round_, concerned) && take_back();
   for (const auto& one : round_)
@@ -356,7 +357,7 @@ TransactionPtr RtuBus::resync_before(TransactionPtr waiting) {
   resync->transaction_class = waiting->transaction_class;
   resync->sequence = waiting->sequence;
   resync->reserved = waiting->reserved;
-  resync->also_of_others = waiting->also_of_others;
+  resync->of_others = waiting->of_others;
   resync->queued_at = waiting->queued_at;
   resync->released_at = waiting->released_at;
   resync->resync = true;

@@ -18,7 +18,8 @@ bool is_stop(const Transaction& transaction) {
 
 bool sends_the_same(const Transaction& a, const Transaction& b) {
   return a.exchange.frame == b.exchange.frame && !a.exchange.guard.gate && !b.exchange.guard.gate &&
-         a.exchange.serial == b.exchange.serial && a.exchange.reply_timeout == b.exchange.reply_timeout &&
+         a.of_others == b.of_others && a.exchange.serial == b.exchange.serial &&
+         a.exchange.reply_timeout == b.exchange.reply_timeout &&
          a.exchange.turnaround_max == b.exchange.turnaround_max;
 }
 
@@ -76,7 +77,6 @@ bool TransactionQueue::merge(Transaction& transaction) {
   auto known = take(found->transaction);
   known->watch = nullptr;  // somebody waits for it
   std::ranges::move(transaction.on_end, std::back_inserter(known->on_end));
-  known->also_of_others = is_of_others(*known) || is_of_others(transaction);
   known->transaction_class = std::min(known->transaction_class, transaction.transaction_class);
   known->awaited_from = std::min(known->awaited_from, transaction.awaited_from);
   known->patient = known->patient && transaction.patient;
@@ -171,7 +171,7 @@ void TransactionQueue::hasten(std::uint8_t node, TransactionClass to) {
   if (waiting == nullptr) return;
   std::vector<Place> late;
   for (const auto& place : *waiting)
-    if (is_of_axis(*place.transaction) && place.transaction->transaction_class > to) late.push_back(place);
+    if (!place.transaction->of_others && place.transaction->transaction_class > to) late.push_back(place);
   for (const auto& place : late) {
     auto hastened = take(place.transaction);
     hastened->transaction_class = to;
@@ -210,7 +210,7 @@ std::vector<TransactionPtr> TransactionQueue::take_reads(std::uint8_t node, Tran
   if (waiting == nullptr) return taken;
   std::vector<Transaction*> reads;
   for (const auto& place : *waiting)
-    if (is_read(*place.transaction) && !is_of_others(*place.transaction) &&
+    if (is_read(*place.transaction) && !place.transaction->of_others &&
         place.transaction->transaction_class <= lowest)
       reads.push_back(place.transaction);
   for (auto* read : reads) taken.push_back(take(read));

@@ -31,25 +31,16 @@ struct Transaction {
   /// axes.
   bool patient = false;
   TimePoint awaited_from = TimePoint::max();  ///< as in TransactionOptions
-  bool doubtful = false;        ///< a stop that is likely to go unanswered: it lets others go first
-  bool reserved = false;        ///< it was given out before motion that waits: only a stop may take its place
-  Watch* watch = nullptr;       ///< that may repeat it
-  bool also_of_others = false;  ///< one of them that was merged into it is: is_of_others()
-  bool given_up = false;        ///< unless it goes out before it can be taken back
+  bool doubtful = false;   ///< a stop that is likely to go unanswered: it lets others go first
+  bool reserved = false;   ///< it was given out before motion that waits: only a stop may take its place
+  Watch* watch = nullptr;  ///< that may repeat it
+  bool of_others = false;  ///< as in TransactionOptions
+  bool given_up = false;   ///< unless it goes out before it can be taken back
   /// Called exactly once each, unless its watch ends between two readings. Several: identical reads or stops
   /// that were merged.
   std::vector<std::function<void(const Transaction&, const ExchangeResult&)>> on_end;
 };
 using TransactionPtr = std::unique_ptr<Transaction>;
-
-/// Its axis waits for it.
-[[nodiscard]] inline bool is_of_axis(const Transaction& transaction) {
-  return transaction.transaction_class <= TransactionClass::idle_state;
-}
-/// Somebody waits for it whatever the axis is told meanwhile: he reads parameters, or scans the bus.
-[[nodiscard]] inline bool is_of_others(const Transaction& transaction) {
-  return transaction.also_of_others || !is_of_axis(transaction);
-}
 
 /// Order of one bus: strict classes, earliest deadline within a class, then order of arrival; among stops the
 /// doubtful ones last, as if they had come `doubtful_patience` later, so that no flood of others keeps them
@@ -92,11 +83,11 @@ class TransactionQueue {
   [[nodiscard]] bool has_stop_before(const Transaction& other) const;
   /// Class of the next one by strict order.
   [[nodiscard]] std::optional<TransactionClass> top_class() const;
-  /// What waits for `node` in a lower class than `to` becomes that urgent, if its axis waits for it.
+  /// What waits for `node` in a lower class than `to` becomes that urgent, but what others wait for.
   void hasten(std::uint8_t node, TransactionClass to);
   /// Takes out all that `gate` forbids to send.
   std::vector<TransactionPtr> take_forbidden(const AxisGate& gate, TimePoint now);
-  /// Takes out all reads that wait for `node` in class `lowest` or above, but those of others.
+  /// Takes out all reads that wait for `node` in class `lowest` or above, but those that others wait for.
   std::vector<TransactionPtr> take_reads(std::uint8_t node, TransactionClass lowest);
   /// Takes out all whose deadline or validity has passed.
   std::vector<TransactionPtr> take_expired(TimePoint now);

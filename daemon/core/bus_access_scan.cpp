@@ -92,7 +92,8 @@ BusScan::Probe BusScan::probe_at(int index) const {
 }
 
 TransactionOptions BusScan::options(const Probe& probe) const {
-  TransactionOptions options{.transaction_class = TransactionClass::scan, .serial = probe.serial};
+  TransactionOptions options{
+      .transaction_class = TransactionClass::scan, .of_others = true, .serial = probe.serial};
   // Waiting long for silent nodes blinds the line: only while nothing on it moves.
   const bool rests = std::ranges::all_of(machine_->axes(), [&](const auto& axis) {
     return axis->settings().bus != bus_->settings().name || axis->at_rest();

@@ -76,7 +76,7 @@ Task<Result<std::vector<std::uint16_t>>> BusAccessService::run_transact(Transact
   if (writes)
     if (const auto allowed = may_write(*machine_, where); !allowed) co_return fail(allowed.error());
   const modbus_rtu::Node node(*bus, request.node);
-  const TransactionOptions options{.transaction_class = TransactionClass::parameters};
+  const TransactionOptions options{.transaction_class = TransactionClass::parameters, .of_others = true};
   auto answer = !writes ? co_await node.read(request.address, request.count, options)
                 : request.values.size() == 1
                     ? co_await node.write(request.address, request.values.front(), options)

@@ -207,7 +207,7 @@ class Axis {
   [[nodiscard]] bool drift_is_next() const;
   void look_for_drift();
   Task<> compare();
-  Task<Result<void>> check_for_drift(TransactionClass priority);
+  Task<Result<void>> check_for_drift(TransactionOptions options);
   void set_drift(const std::string& text);
 
   // axis_journal.cpp: commands over restarts of the daemon

@@ -23,15 +23,15 @@ void Axis::look_for_drift() {
   if (drift_.drifted() && free && sample_ && !sample_->enabled) reconfigure(drift_.text(), false);
 }
 
-/// In a class that no start or stop ends or hastens: it comes to its end however often the axis moves.
+/// No start or stop ends or hastens what it reads: it comes to its end however often the axis moves.
 Task<> Axis::compare() {
-  co_await check_for_drift(TransactionClass::parameters);
+  co_await check_for_drift({.transaction_class = TransactionClass::parameters, .of_others = true});
   if (drift_.drifted()) wake();
 }
 
-Task<Result<void>> Axis::check_for_drift(TransactionClass priority) {
+Task<Result<void>> Axis::check_for_drift(TransactionOptions options) {
   const auto number = drift_.begin(env_.clock->now());
-  const auto drift = co_await drive_->check_drift(priority);
+  const auto drift = co_await drive_->check_drift(std::move(options));
   const bool counts = drift_.end(number);
   if (!drift) co_return fail(drift.error());
   // It was configured meanwhile, or connected anew: what was read before says nothing.

@@ -187,7 +187,9 @@ Task<Result<void>> Axis::prove_or_configure() {
   }
   if (!link_.is_configured()) {
     if (const auto configured = co_await configure(restorable); !configured) co_return configured;
-  } else if (const auto checked = co_await check_for_drift(TransactionClass::idle_state); !checked) {
+  } else if (const auto checked =
+                 co_await check_for_drift({.transaction_class = TransactionClass::idle_state});
+             !checked) {
     co_return checked;  // somebody may have changed it while it was out of reach
   }
   const auto sample = co_await drive_->read_state(TransactionClass::idle_state);

@@ -94,7 +94,7 @@ class Cia402Drive final : public Drive {
   Task<Result<std::unique_ptr<LoadedMove>>> load_move(MoveProfile profile, MotionGuard guard) override;
 
   // drive_configuration.cpp
-  Task<Result<Drift>> check_drift(TransactionClass transaction_class) override;
+  Task<Result<Drift>> check_drift(TransactionOptions options) override;
 
   // drive_parameters.cpp
   [[nodiscard]] std::string configured_by(std::uint32_t address) const override;

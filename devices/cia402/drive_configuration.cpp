@@ -170,7 +170,10 @@ Task<Result<void>> Cia402Drive::verify(const std::vector<ObjectSetting>& require
   co_return Result<void>{};
 }
 
-Task<Result<Drift>> Cia402Drive::check_drift(TransactionClass transaction_class) {
+Task<Result<Drift>> Cia402Drive::check_drift(TransactionOptions options) {
+  const SdoOptions asked{.transaction_class = options.transaction_class,
+                         .deadline = options.deadline,
+                         .guard = std::move(options.guard)};
   std::vector<ObjectSetting> watched;
   if (model_->objects.eeprom_switch)
     watched.push_back({.address = model_->objects.eeprom_switch->key(),
@@ -178,7 +181,7 @@ Task<Result<Drift>> Cia402Drive::check_drift(TransactionClass transaction_class)
                        .key = "persist"});
   for (const auto& setting : setup_objects_.required)  // homing's objects are compared before each homing
     if (!setting.key.starts_with("homing.")) watched.push_back(setting);
-  const auto present = co_await read_values(addresses_of(watched), {.transaction_class = transaction_class});
+  const auto present = co_await read_values(addresses_of(watched), asked);
   if (!present) co_return fail(present.error());
   Drift drift;
   for (const auto& setting : watched) {
@@ -190,12 +193,11 @@ Task<Result<Drift>> Cia402Drive::check_drift(TransactionClass transaction_class)
     drift.limits_changed =
         drift.limits_changed || setting.key == "drive.overtravel_stop" || setting.key.starts_with("inputs");
   }
-  const auto units = co_await unit_conflict({.transaction_class = transaction_class});
+  const auto units = co_await unit_conflict(asked);
   if (!units) co_return fail(units.error());
-  const auto braking = co_await deceleration_conflict({.transaction_class = transaction_class});
+  const auto braking = co_await deceleration_conflict(asked);
   if (!braking) co_return fail(braking.error());
-  if (const auto quick = co_await read_quick_stop_ramp({.transaction_class = transaction_class}); !quick)
-    co_return fail(quick.error());
+  if (const auto quick = co_await read_quick_stop_ramp(asked); !quick) co_return fail(quick.error());
   for (const auto* conflict : {&*units, &*braking})
     if (*conflict) drift.text += (drift.text.empty() ? "" : "; ") + (*conflict)->message;
   drift.scale_changed = drift.scale_changed || units->has_value();

@@ -35,7 +35,7 @@ class YakoRtuDrive final : public Drive {
   using Drive::read_state;
   Task<Result<DriveSample>> read_state(TransactionClass transaction_class, TimePoint awaited_from) override;
   Task<Result<std::optional<DriveSample>>> watch_state(StateWatch watch) override;
-  Task<Result<Drift>> check_drift(TransactionClass transaction_class) override;
+  Task<Result<Drift>> check_drift(TransactionOptions options) override;
   [[nodiscard]] bool moves_by_itself() const override;
   [[nodiscard]] bool closed_loop() const override;
   [[nodiscard]] std::int64_t position_window() const override;

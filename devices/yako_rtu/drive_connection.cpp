@@ -391,7 +391,7 @@ Task<Result<void>> YakoRtuDrive::check_inactive(const RegisterSetting& setting) 
   co_return Result<void>{};
 }
 
-Task<Result<Drift>> YakoRtuDrive::check_drift(TransactionClass transaction_class) {
+Task<Result<Drift>> YakoRtuDrive::check_drift(TransactionOptions options) {
   // Homing's block is compared before each homing, the performance group moves nothing.
   std::vector<RegisterSetting> watched{{.address = reg::eeprom_update,
                                         .value = static_cast<std::uint16_t>(saves_at_rest() ? 0 : 1),
@@ -400,7 +400,7 @@ Task<Result<Drift>> YakoRtuDrive::check_drift(TransactionClass transaction_class
     if (setting.address < reg::homing_start ||
         (setting.address >= reg::input_levels && setting.address < reg::performance))
       watched.push_back(setting);
-  const auto present = co_await read_registers(addresses_of(watched), in(transaction_class));
+  const auto present = co_await read_registers(addresses_of(watched), std::move(options));
   if (!present) co_return fail(present.error());
   Drift drift;
   for (const auto& setting : watched) {

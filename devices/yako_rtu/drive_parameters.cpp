@@ -18,6 +18,10 @@ constexpr int canary_attempts = 3;
 constexpr std::array<std::string_view, 4> formats = {"8N1", "8N2", "8E1", "8O1"};  // codes of 0x0015
 
 TransactionOptions parameters() { return {.transaction_class = TransactionClass::parameters}; }
+/// What a client asked for to know it: no part of what the axis does.
+TransactionOptions reading_of_client() {
+  return {.transaction_class = TransactionClass::parameters, .of_others = true};
+}
 TransactionOptions eeprom() {
   auto options = parameters();
   options.turnaround_max = eeprom_patience;
@@ -52,7 +56,7 @@ std::string YakoRtuDrive::configured_by(std::uint32_t address) const {
 Task<Result<std::vector<ParameterValue>>> YakoRtuDrive::read_parameters(
     std::vector<std::uint32_t> addresses) {
   std::vector<std::uint16_t> wanted(addresses.begin(), addresses.end());
-  const auto registers = co_await read_registers(std::move(wanted), parameters());
+  const auto registers = co_await read_registers(std::move(wanted), reading_of_client());
   if (!registers) co_return fail(registers.error());
   std::vector<ParameterValue> values;
   values.reserve(addresses.size());
@@ -107,7 +111,7 @@ Task<Result<DriveSegments>> YakoRtuDrive::read_segments() {
   for (const auto first : {reg::segment_pulses_high, reg::segment_pulses_low, reg::segment_speed,
                            reg::segment_time, reg::segment_pv_speed})
     for (std::uint16_t i = 0; i < 16; ++i) addresses.push_back(static_cast<std::uint16_t>(first + i));
-  const auto registers = co_await read_registers(std::move(addresses), parameters());
+  const auto registers = co_await read_registers(std::move(addresses), reading_of_client());
   if (!registers) co_return fail(registers.error());
   DriveSegments segments{.absolute = registers->at(reg::terminal_move_mode) == 1};
   for (std::uint16_t i = 0; i < 16; ++i) {
@@ -167,7 +171,7 @@ Task<Result<std::string>> YakoRtuDrive::restore_factory(std::vector<std::uint8_t
   const auto kept = static_cast<std::uint64_t>(std::ranges::count_if(required_, &RegisterSetting::saved));
   const auto saves = 1 + (kept == 0 ? 0 : kept + 2);  // two turn the switch, there and back
   if (const auto permitted = permit_saves(saves); !permitted) co_return fail(permitted.error());
-  const auto before = co_await read_registers({reg::node, reg::custom_node}, parameters());
+  const auto before = co_await read_registers({reg::node, reg::custom_node}, reading_of_client());
   if (!before) co_return fail(before.error());
   const auto node = before->at(reg::node);
   const bool custom = before->at(reg::custom_node) == node;

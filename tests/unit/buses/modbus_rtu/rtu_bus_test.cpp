@@ -70,16 +70,19 @@ TEST(RtuBus, WhatOthersReadOutlivesAStart) {
   BusRig rig;
   rig.transact("under way", {.node = 2, .address = 0x0003, .count = 1}, {});
   rig.world.run_for(1ms);
-  rig.read("parameters", 0x0034, 1);
+  rig.transact("parameters", {.node = 1, .address = 0x0034, .count = 1}, {.of_others = true});
+  rig.read("to connect", 0x0035, 1);
   rig.transact("state", {.node = 1, .address = 0x0004, .count = 1},
                {.transaction_class = TransactionClass::idle_state});
   rig.bus->hasten(1, TransactionClass::moving_state);
   rig.bus->give_up_readings(1);
   rig.world.run_for(100ms);
-  ASSERT_EQ(rig.results.size(), 3U);
+  ASSERT_EQ(rig.results.size(), 4U);
   EXPECT_TRUE(rig.results.at("parameters"));
-  ASSERT_FALSE(rig.results.at("state"));
-  EXPECT_EQ(rig.results.at("state").error().reason, Reason::superseded);
+  for (const auto* ended : {"state", "to connect"}) {
+    ASSERT_FALSE(rig.results.at(ended));
+    EXPECT_EQ(rig.results.at(ended).error().reason, Reason::superseded);
+  }
 }
 
 /// As before, where another read has to go out before it: the first one was lost.

@@ -124,7 +124,6 @@ TEST(TransactionQueue, EqualReadsMergeAndBothAreTold) {
   queue.push(std::move(high));
   queue.push(read_of(1, Class::parameters, TimePoint::max(), 2));  // another node
   ASSERT_EQ(queue.size(), 2U);
-  EXPECT_TRUE(queue.take_reads(1, Class::idle_state).empty()) << "its axis is not the only one that waits";
   const auto merged = queue.pop();
   EXPECT_EQ(merged->transaction_class, Class::moving_state);
   EXPECT_EQ(merged->exchange.deadline, TimePoint{} + 2s);
@@ -281,25 +280,43 @@ TEST(TransactionQueue, ReadsOfOneNodeAreTakenOutDownToAClassHeldOrNot) {
   EXPECT_EQ(drain(queue), (std::vector<std::uint16_t>{6, 3, 4}));
 }
 
-/// What somebody else reads of a drive is neither hurried nor ended because its axis starts or stops.
+TransactionPtr of_others(std::uint16_t address, Class of) {
+  auto reading = read_of(address, of);
+  reading->of_others = true;
+  return reading;
+}
+
+/// What somebody else reads of a drive is neither hurried nor ended because its axis starts or stops; what
+/// the axis reads to connect is.
 TEST(TransactionQueue, WhatOthersAskOfANodeIsNotHastened) {
   TransactionQueue queue;
-  queue.push(read_of(1, Class::parameters));
-  queue.push(read_of(2, Class::scan));
-  queue.push(read_of(3, Class::idle_state));
-  queue.hold(read_of(4, Class::parameters));
+  queue.push(of_others(1, Class::parameters));
+  queue.push(of_others(2, Class::scan));
+  queue.push(read_of(3, Class::parameters));
+  queue.hold(of_others(4, Class::parameters));
+  queue.hold(read_of(5, Class::parameters));
+  EXPECT_TRUE(queue.take_reads(1, Class::idle_state).empty()) << "nobody is in a hurry yet";
   queue.hasten(1, Class::moving_state);
   EXPECT_EQ(queue.size(Class::moving_state), 1U);
   EXPECT_EQ(queue.size(Class::parameters), 1U);
   EXPECT_EQ(queue.size(Class::scan), 1U);
-  queue.push(read_of(5, Class::parameters));
-  queue.push(read_of(5, Class::idle_state));  // joins it
-  queue.hasten(1, Class::moving_state);
-  EXPECT_EQ(queue.size(Class::moving_state), 2U) << "its axis waits for it, too";
-  EXPECT_EQ(queue.take_reads(1, Class::idle_state).size(), 1U);
-  EXPECT_EQ(queue.pop()->exchange.request.address, 5);
+  std::vector<std::uint16_t> taken;
+  for (const auto& read : queue.take_reads(1, Class::idle_state))
+    taken.push_back(read->exchange.request.address);
+  EXPECT_EQ(taken, (std::vector<std::uint16_t>{3, 5}));
   queue.release(1, {});
   EXPECT_EQ(drain(queue), (std::vector<std::uint16_t>{1, 4, 2}));
+}
+
+/// Else it could be ended no more, or take the others' with it.
+TEST(TransactionQueue, NoReadingOfAnAxisJoinsThatOfOthers) {
+  TransactionQueue queue;
+  queue.push(of_others(1, Class::parameters));
+  queue.push(of_others(1, Class::parameters));  // joins the first one
+  queue.push(read_of(1, Class::idle_state));
+  EXPECT_EQ(queue.size(), 2U);
+  EXPECT_EQ(queue.take_reads(1, Class::idle_state).size(), 1U);
+  EXPECT_EQ(queue.size(), 1U);
 }
 
 TEST(TransactionQueue, PutBackKeepsItsPlace) {

@@ -116,12 +116,12 @@ TEST(Cia402Parameters, HoldsBackAnInputThatCouldStartAtOnce) {
 TEST(Cia402Parameters, ReportsDriftOfTerminalsAndScale) {
   DriveBench bench({}, with_jog());
   bench.bring_up();
-  const auto none = bench.run(bench.drive().check_drift(TransactionClass::parameters));
+  const auto none = bench.run(bench.drive().check_drift({}));
   ASSERT_TRUE(none);
   EXPECT_EQ(none->text, "");
   bench.simulated().poke(object::first_input_function.key(), 0);
   bench.simulated().poke(object::microstep.key(), 3);
-  const auto drift = bench.run(bench.drive().check_drift(TransactionClass::parameters));
+  const auto drift = bench.run(bench.drive().check_drift({}));
   ASSERT_TRUE(drift);
   EXPECT_TRUE(drift->scale_changed);
   EXPECT_TRUE(drift->limits_changed);

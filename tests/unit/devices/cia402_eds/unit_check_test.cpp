@@ -253,7 +253,7 @@ TEST(UnitCheck, APowerCycleIsLookedAtAnew) {
 TEST(UnitCheck, AUnitThatIsChangedLaterIsFound) {
   UnitBench bench(with_objects({{"60A9h:00", in_pulses}}, ""), {{velocity_si, in_pulses}});
   ASSERT_TRUE(bench.bring_up());
-  const auto look = [&] { return bench.run(bench.drive().check_drift(TransactionClass::parameters)); };
+  const auto look = [&] { return bench.run(bench.drive().check_drift({})); };
   const auto none = look();
   ASSERT_TRUE(none) << to_string(none.error());
   EXPECT_EQ(none->text, "");
@@ -272,7 +272,7 @@ TEST(UnitCheck, ADecelerationThatIsChangedLaterIsFound) {
   settings["objects.6084h:00.default"] = std::int64_t{5000};
   UnitBench bench(settings, {{deceleration, 5000}});
   ASSERT_TRUE(bench.bring_up());
-  const auto look = [&] { return bench.run(bench.drive().check_drift(TransactionClass::parameters)); };
+  const auto look = [&] { return bench.run(bench.drive().check_drift({})); };
   for (const std::uint32_t good : {5000U, 6000U}) {
     bench.answers()[deceleration] = good;
     const auto none = look();
@@ -298,7 +298,7 @@ TEST(UnitCheck, TheRampOfAQuickStopIsReadFromTheDrive) {
   EXPECT_EQ(bench.drive().quick_stop_time(600), std::optional<Duration>(20ms));
   const auto look = [&](std::optional<std::uint32_t> held) {
     bench.answers()[quick_stop_ramp] = held;
-    const auto drift = bench.run(bench.drive().check_drift(TransactionClass::parameters));
+    const auto drift = bench.run(bench.drive().check_drift({}));
     ASSERT_TRUE(drift) << to_string(drift.error());
     EXPECT_EQ(drift->text, "");
   };
