@@ -124,8 +124,13 @@ Task<Result<Answer>> RtuBus::transact(Request request, TransactionOptions option
       ->on_end.emplace_back([this, &promise](const Transaction& ended, const ExchangeResult& result) {
         promise.set(answer(ended, result));
       });
-  submit(*std::move(transaction));
-  pump();
+  // It would wait in vain, and for long where its node is held back.
+  if (const auto now = clock_->now(); may_send((*transaction)->exchange.guard, now) != Verdict::send) {
+    drop(*std::move(transaction), now);
+  } else {
+    submit(*std::move(transaction));
+    pump();
+  }
   co_return co_await promise.get();
 }
 

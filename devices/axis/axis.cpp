@@ -71,6 +71,7 @@ void Axis::close() {
   life_.close();
   link_.close();
   supersede(error(Reason::cancelled, "the daemon ends"));
+  give_up_comparison();
   publish();
   wake();
   for (auto* signal : {&sampled_, &stopped_}) signal->notify_all();

@@ -207,6 +207,7 @@ class Axis {
   [[nodiscard]] bool drift_is_next() const;
   void look_for_drift();
   Task<> compare();
+  void give_up_comparison();
   Task<Result<void>> check_for_drift(TransactionOptions options);
   void set_drift(const std::string& text);
 
@@ -473,6 +474,7 @@ class Axis {
   TimePoint had_turn_{};  ///< the last time that it was its turn to start
   EarlierRun earlier_;
   DriftWatch drift_;
+  std::shared_ptr<AxisGate> comparison_gate_ = std::make_shared<AxisGate>();  ///< of what compare() reads
   PollPace pace_;
   std::weak_ptr<void> maintenance_;                       ///< of begin_maintenance()
   std::shared_ptr<int> users_ = std::make_shared<int>();  ///< of use()

@@ -18,15 +18,25 @@ bool Axis::drift_is_next() const {
 /// meanwhile as ever, also of a motion that begins.
 void Axis::look_for_drift() {
   if (!link_.online() || busy()) return;
+  const bool free = maintenance_.expired() && sample_ && !sample_->enabled;
+  if (drift_.drifted() && free) return reconfigure(drift_.text(), false);
   if (drift_is_next()) launch(compare(), "comparison");
-  const bool free = link_.online() && !busy() && maintenance_.expired();
-  if (drift_.drifted() && free && sample_ && !sample_->enabled) reconfigure(drift_.text(), false);
 }
 
 /// No start or stop ends or hastens what it reads: it comes to its end however often the axis moves.
 Task<> Axis::compare() {
-  co_await check_for_drift({.transaction_class = TransactionClass::parameters, .of_others = true});
+  co_await check_for_drift({.transaction_class = TransactionClass::parameters,
+                            .guard = {.gate = comparison_gate_, .epoch = comparison_gate_->epoch()},
+                            .of_others = true});
   if (drift_.drifted()) wake();
+}
+
+/// What is being compared would say nothing any more, as the drive is out of reach, or is written to, or
+/// keep those waiting who wait for the end of the axis.
+void Axis::give_up_comparison() {
+  drift_.give_up();
+  comparison_gate_->raise();
+  env_.bus->purge_superseded(settings_.node, *comparison_gate_);
 }
 
 Task<Result<void>> Axis::check_for_drift(TransactionOptions options) {
@@ -34,7 +44,7 @@ Task<Result<void>> Axis::check_for_drift(TransactionOptions options) {
   const auto drift = co_await drive_->check_drift(std::move(options));
   const bool counts = drift_.end(number);
   if (!drift) co_return fail(drift.error());
-  // It was configured meanwhile, or connected anew: what was read before says nothing.
+  // It was configured or written to meanwhile, or connected anew: what was read before says nothing.
   if (!counts) co_return Result<void>{};
   if (drift->scale_changed) lose_trust();
   set_drift(drift->text);

@@ -267,12 +267,14 @@ Result<std::shared_ptr<void>> Axis::begin_maintenance() {
                       "disable the axis first"));
   auto token = std::make_shared<int>(0);
   maintenance_ = token;
+  give_up_comparison();
   return token;
 }
 
 void Axis::reconfigure(const std::string& why, bool position_lost) {
   spdlog::info("{}: applying the configuration again: {}", settings_.name, why);
   link_.reconfigure(error(Reason::configuring, "the configuration is applied again: " + why, "wait"));
+  give_up_comparison();
   if (position_lost) {
     lose_trust();
     tracker_.forget_base();
@@ -297,6 +299,7 @@ void Axis::go_offline(const Error& cause) {
   link_.lost(cause);
   revoke_motion();
   env_.bus->give_up_readings(settings_.node);
+  give_up_comparison();
   const bool moved = (activity_ && activity_->state != AxisState::standstill) || stop_.under_way() ||
                      terminal_motion_.moves() || (sample_ && sample_->moving);
   // Nobody can say whether the drive goes on: it has no communication watchdog. It is owed a stop (M4).
@@ -322,6 +325,7 @@ void Axis::on_reboot(const Error& cause) {
   log_about_axis(spdlog::level::warn, LogKind::axis_rebooted, settings_,
                  fmt::format("{}: {}", settings_.name, to_string(cause)));
   link_.restarted(cause);
+  give_up_comparison();
   power_.restarted();
   auto told = cause;
   if (activity_ && activity_->start.may_run()) told.outcome = Outcome::unknown;  // it may have started before

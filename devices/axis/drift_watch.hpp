@@ -15,7 +15,8 @@ namespace axisd {
 ///   as_configured -- found(), something --> drifted
 ///   drifted -- found(), nothing ----------> as_configured
 ///
-/// Beside that a comparison may be under way, from begin() to its end(): the newest alone counts.
+/// Beside that a comparison may be under way, from begin() to its end(): the newest alone counts, and none
+/// that was given up.
 class DriftWatch {
  public:
   enum class State : std::uint8_t { as_configured, drifted };
@@ -25,7 +26,7 @@ class DriftWatch {
 
   /// A comparison begins; its number. What is still being compared counts no more.
   std::uint64_t begin(TimePoint at) {
-    checked_ = at;
+    before_ = std::exchange(checked_, at);
     under_way_ = ++last_;
     return last_;
   }
@@ -34,6 +35,10 @@ class DriftWatch {
     if (under_way_ != number) return false;
     under_way_ = none;
     return true;
+  }
+  /// What is being compared counts no more: it is compared again as if it had not begun.
+  void give_up() {
+    if (std::exchange(under_way_, none) != none) checked_ = before_;
   }
   /// The configuration was applied.
   void applied(TimePoint at) {
@@ -62,6 +67,7 @@ class DriftWatch {
 
   Duration period_;
   TimePoint checked_{};
+  TimePoint before_{};                            ///< checked_ without the newest comparison
   std::uint64_t last_ = none, under_way_ = none;  ///< numbers of comparisons
   std::string text_;
 };

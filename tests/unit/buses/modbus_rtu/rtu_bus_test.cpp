@@ -85,6 +85,33 @@ TEST(RtuBus, WhatOthersReadOutlivesAStart) {
   }
 }
 
+/// Also where its node is held back: nobody waits until it may be asked again.
+TEST(RtuBus, WhatItsGateForbidsEndsAtOnce) {
+  BusRig rig;
+  const auto gate = std::make_shared<AxisGate>();
+  const TransactionOptions guarded{.guard = {.gate = gate, .epoch = gate->epoch()}, .of_others = true};
+  const auto ask = [&](const std::string& name) {
+    rig.transact(name, {.node = 1, .address = 0x0034, .count = 1}, guarded);
+  };
+  rig.line->network().set_connected(false);
+  rig.read("in vain", 0x0003, 1);
+  rig.world.run_for(50ms);
+  ASSERT_TRUE(rig.bus->holds_back(1));
+  ask("held");
+  rig.world.run_for(1ms);
+  EXPECT_EQ(rig.results.size(), 1U);
+  gate->raise();
+  rig.bus->purge_superseded(1, *gate);
+  ask("too late");
+  rig.world.run_for(1ms);
+  for (const auto* name : {"held", "too late"}) {
+    ASSERT_TRUE(rig.results.contains(name));
+    ASSERT_FALSE(rig.results.at(name));
+    EXPECT_EQ(rig.results.at(name).error().reason, Reason::superseded);
+  }
+  EXPECT_EQ(rig.line->wire().size(), 1U);
+}
+
 /// As before, where another read has to go out before it: the first one was lost.
 TEST(RtuBus, AReadingIsHastenedWhileAnotherGoesBeforeIt) {
   BusRig rig;

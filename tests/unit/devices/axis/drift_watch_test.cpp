@@ -50,5 +50,19 @@ TEST(DriftWatch, TheNewestComparisonCounts) {
   EXPECT_FALSE(drift.end(third)) << "the drive was configured meanwhile";
 }
 
+TEST(DriftWatch, WhatIsGivenUpIsComparedAgain) {
+  DriftWatch drift(period);
+  drift.applied(checked);
+  drift.give_up();  // nothing
+  EXPECT_FALSE(drift.is_next(checked + period - 1ms, true));
+  const auto first = drift.begin(checked + period);
+  drift.give_up();
+  EXPECT_FALSE(drift.end(first));
+  EXPECT_TRUE(drift.is_next(checked + period, true)) << "as if it had not begun";
+  EXPECT_TRUE(drift.end(drift.begin(checked + period)));
+  drift.give_up();
+  EXPECT_FALSE(drift.is_next(checked + period, true)) << "it had ended before";
+}
+
 }  // namespace
 }  // namespace axisd

@@ -128,6 +128,18 @@ TEST(Cia402Parameters, ReportsDriftOfTerminalsAndScale) {
   EXPECT_THAT(drift->text, HasSubstr("inputs.X0 (object 2030h:02) reads 0 instead of 2"));
 }
 
+TEST(Cia402Parameters, AComparisonEndsWithItsGate) {
+  DriveBench bench({}, with_jog());
+  bench.bring_up();
+  const auto gate = std::make_shared<AxisGate>();
+  const TransactionOptions options{.guard = {.gate = gate, .epoch = gate->epoch()}};
+  EXPECT_TRUE(bench.run(bench.drive().check_drift(options)));
+  gate->raise();
+  const auto drift = bench.run(bench.drive().check_drift(options));
+  ASSERT_FALSE(drift);
+  EXPECT_EQ(drift.error().reason, Reason::superseded) << to_string(drift.error());
+}
+
 TEST(Cia402Parameters, NamesTheOwnerOfEachObject) {
   auto setup = with_jog();
   setup.homing = HomingProfile{.velocity_rpm = 100, .search_velocity_rpm = 20};
