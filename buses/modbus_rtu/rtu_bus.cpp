@@ -238,8 +238,7 @@ void RtuBus::finish(std::span<const ExchangeResult> results) {
 /// the readings of moving axes, and to a few that turns before it were spared: so much the published start
 /// counts.
 TransactionPtr RtuBus::pop(TimePoint now) {
-  const auto* const start = queue_.next_of(TransactionClass::motion);
-  if (start == nullptr || !can_wait(*start, now)) return queue_.pop();
+  if (queue_.size(TransactionClass::motion) == 0 || !starts_can_wait(now)) return queue_.pop();
   if (start_turns_.starts_of_turn() > 1) return queue_.pop();
   if (start_turns_.expected_wait() + usual_start(settings_) > longest_proof) return queue_.pop();
   const auto turns = start_turns_.begun();
@@ -250,6 +249,12 @@ TransactionPtr RtuBus::pop(TimePoint now) {
   auto next = queue_.pop(asked);
   if (next->transaction_class == TransactionClass::moving_state || next->patient) ++gave_way_;
   return next;
+}
+
+/// All that waits as motion, as the last of it comes behind the reading, too.
+bool RtuBus::starts_can_wait(TimePoint now) const {
+  return queue_.all_of(TransactionClass::motion,
+                       [this, now](const Transaction& motion) { return can_wait(motion, now); });
 }
 
 /// It is part of one axis's start, and its guard leaves time for what would go before it, and for another

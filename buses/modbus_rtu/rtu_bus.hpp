@@ -125,6 +125,7 @@ class RtuBus final : public Bus {
   static void know(Exchange& exchange, Known& known);
   void note_known(const Exchange& exchange, const ExchangeResult& result);
   [[nodiscard]] TransactionPtr pop(TimePoint now);
+  [[nodiscard]] bool starts_can_wait(TimePoint now) const;
   [[nodiscard]] bool can_wait(const Transaction& motion, TimePoint now) const;
   void arm_next();
   [[nodiscard]] bool must_wait(const Transaction& transaction, TimePoint now) const;

@@ -155,6 +155,12 @@ const Transaction* TransactionQueue::next_of(TransactionClass transaction_class)
   return waiting.empty() ? nullptr : waiting.begin()->get();
 }
 
+bool TransactionQueue::all_of(TransactionClass transaction_class,
+                              const std::function<bool(const Transaction&)>& holds) const {
+  return std::ranges::all_of(lanes_.at(static_cast<std::size_t>(transaction_class)),
+                             [&holds](const TransactionPtr& one) { return holds(*one); });
+}
+
 /// The waiting class below `top` whose turn it is: the first one after the last that had a reservation.
 TransactionQueue::Lane* TransactionQueue::next_below(std::size_t top) {
   const auto below = lanes_.size() - top - 1;

@@ -69,6 +69,9 @@ class TransactionQueue {
   TransactionPtr pop(std::optional<TimePoint> awaited_by = {});
   /// The next one of its class, or nullptr.
   [[nodiscard]] const Transaction* next_of(TransactionClass transaction_class) const;
+  /// `holds` says so of all that pop() might give out of that class.
+  [[nodiscard]] bool all_of(TransactionClass transaction_class,
+                            const std::function<bool(const Transaction&)>& holds) const;
   /// Nothing is to be given out but class idle_state.
   [[nodiscard]] bool only_idle() const;
   /// What pop() gives then, or nullptr.

@@ -86,6 +86,30 @@ TEST(RtuBus, AnAwaitedReadingGoesBeforeAStartThatCanWait) {
   }
 }
 
+/// All that waits behind a start comes later, too: nothing goes before it where one of that cannot wait.
+TEST(RtuBus, AStartWaitsForNoReadingBeforeSomethingElseThatCannot) {
+  enum class Behind : std::uint8_t { start, reading, member_of_a_group };
+  for (const auto behind : {Behind::start, Behind::reading, Behind::member_of_a_group}) {
+    SCOPED_TRACE(std::to_underlying(behind));
+    BusRig rig;
+    take_turns(rig, 2);
+    auto second = guarded(std::make_shared<AxisGate>());
+    if (behind == Behind::reading) second.guard = {};
+    if (behind == Behind::member_of_a_group) second.guard.with = std::make_shared<std::vector<MotionGuard>>();
+    rig.transact("under way", {.node = 2, .address = 0x0003, .count = 1}, {});
+    rig.world.run_for(1ms);
+    rig.transact("start", trigger_of(1), guarded(std::make_shared<AxisGate>()));
+    rig.transact("behind it", {.node = 1, .address = 0x0007, .count = 1}, second);
+    rig.transact("awaited", {.node = 2, .address = 0x0005, .count = 1},
+                 {.transaction_class = TransactionClass::moving_state, .awaited_from = rig.world.now()});
+    rig.world.run_for(200ms);
+    std::vector<std::uint16_t> order;
+    for (const auto& entry : rig.line->wire()) order.push_back(entry.address());
+    EXPECT_EQ(order, behind == Behind::start ? (std::vector<std::uint16_t>{0x0003, 0x0005, 0x0027, 0x0007})
+                                             : (std::vector<std::uint16_t>{0x0003, 0x0027, 0x0007, 0x0005}));
+  }
+}
+
 /// What goes first may be answered as late as its node may.
 TEST(RtuBus, AStartWaitsForNoReadingThatMayTakeAllOfItsTime) {
   for (const auto turnaround : {20ms, 120ms}) {
