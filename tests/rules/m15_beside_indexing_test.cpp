@@ -182,6 +182,40 @@ TEST(M15, AComparisonKeepsNoMotionFromBeingSeen) {
              ms(first.predicted.alone.standstill + first.deceleration));
 }
 
+/// The reply to a stop may be the late one of that before it: then the drive is read, and the stop goes out
+/// once more. Neither waits for what others read of their drives (M15: no bound counts that).
+TEST(M15, AStopThatIsNotCertainWaitsForNoAwaitedReading) {
+  constexpr std::uint16_t stop = 0x0028, moving = 0x0004;
+  ComparedAxes compared(4);
+  auto& line = compared.line;
+  auto& indexing = *compared.axes;
+  std::mt19937_64 random(1);
+  int uncertain = 0;
+  for (int round = 0; round < 150; ++round) {
+    indexing.run(100ms + Duration(random() % Duration(100ms).count()));
+    line.line->network().faults().add(
+        {.kind = simulation::FaultKind::drop_reply, .node = 1, .register_address = stop});
+    line.line->forget_wire();
+    indexing.stop(0);
+    indexing.run(100ms);
+    // Its frames, and where they stand among all.
+    std::vector<std::size_t> of_stop;
+    const auto& wire = line.line->wire();
+    for (std::size_t i = 0; i < wire.size(); ++i) {
+      const bool read = !wire[i].is_write() && wire[i].address() == moving;
+      if (wire[i].node() == 1 && (wire[i].address() == stop || read)) of_stop.push_back(i);
+    }
+    if (of_stop.size() < 4) continue;  // a reading of its state came between
+    ++uncertain;
+    ASSERT_EQ(wire[of_stop[2]].address(), moving);
+    // One may have been under way as the stop was heard; or have its turn by the reservation.
+    EXPECT_LE(of_stop[2] - of_stop[1], 2U) << round;
+    EXPECT_LE(of_stop[3] - of_stop[2], 2U) << round;
+  }
+  EXPECT_GT(uncertain, 50);
+  EXPECT_EQ(indexing.failures, std::vector<std::string>{});
+}
+
 /// What a client reads of a drive is not ended by its starts.
 TEST(M32, ParametersAreReadThoughTheAxisIndexes) {
   ComparedAxes compared(4);
