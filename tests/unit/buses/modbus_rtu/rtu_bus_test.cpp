@@ -74,6 +74,7 @@ TEST(RtuBus, WhatOthersReadOutlivesAStart) {
   rig.read("to connect", 0x0035, 1);
   rig.transact("state", {.node = 1, .address = 0x0004, .count = 1},
                {.transaction_class = TransactionClass::idle_state});
+  rig.world.run_for(1us);
   rig.bus->hasten(1, TransactionClass::moving_state);
   rig.bus->give_up_readings(1);
   rig.world.run_for(100ms);
