@@ -144,6 +144,8 @@ class YakoRtuDrive final : public Drive {
   Task<Result<void>> prepare_homing(HomingBlock block, TransactionOptions options);
 
   // drive_parameters.cpp
+  Task<Result<std::vector<ParameterValue>>> read_values(std::vector<std::uint32_t> addresses,
+                                                        TransactionOptions options) const;
   [[nodiscard]] Result<std::vector<ParameterValue>> serial_registers(const SerialChange& change) const;
   [[nodiscard]] std::string serial_advice(const SerialChange& change) const;
 

@@ -18,7 +18,7 @@ constexpr int canary_attempts = 3;
 constexpr std::array<std::string_view, 4> formats = {"8N1", "8N2", "8E1", "8O1"};  // codes of 0x0015
 
 TransactionOptions parameters() { return {.transaction_class = TransactionClass::parameters}; }
-/// What a client asked for to know it: no part of what the axis does.
+/// What a client wants to know, and no part of what is done to the drive.
 TransactionOptions reading_of_client() {
   return {.transaction_class = TransactionClass::parameters, .of_others = true};
 }
@@ -55,8 +55,13 @@ std::string YakoRtuDrive::configured_by(std::uint32_t address) const {
 
 Task<Result<std::vector<ParameterValue>>> YakoRtuDrive::read_parameters(
     std::vector<std::uint32_t> addresses) {
+  co_return co_await read_values(std::move(addresses), reading_of_client());
+}
+
+Task<Result<std::vector<ParameterValue>>> YakoRtuDrive::read_values(std::vector<std::uint32_t> addresses,
+                                                                    TransactionOptions options) const {
   std::vector<std::uint16_t> wanted(addresses.begin(), addresses.end());
-  const auto registers = co_await read_registers(std::move(wanted), reading_of_client());
+  const auto registers = co_await read_registers(std::move(wanted), std::move(options));
   if (!registers) co_return fail(registers.error());
   std::vector<ParameterValue> values;
   values.reserve(addresses.size());
@@ -76,7 +81,7 @@ Task<Result<std::vector<ParameterValue>>> YakoRtuDrive::write_parameters(std::ve
   std::vector<std::uint32_t> addresses;
   addresses.reserve(values.size());
   for (const auto& value : values) addresses.push_back(value.address);
-  const auto before = co_await read_parameters(addresses);
+  const auto before = co_await read_values(addresses, parameters());
   if (!before) co_return fail(before.error());
   const auto differs = [&](std::size_t i) {
     return ((*before)[i].value & 0xFFFF) != (values[i].value & 0xFFFF);
@@ -92,7 +97,7 @@ Task<Result<std::vector<ParameterValue>>> YakoRtuDrive::write_parameters(std::ve
     const auto written = co_await write_run(static_cast<std::uint16_t>(values[i].address), std::move(word));
     if (!written) co_return fail(written.error());
   }
-  auto present = co_await read_parameters(std::move(addresses));
+  auto present = co_await read_values(std::move(addresses), parameters());
   if (!present) co_return present;
   for (std::size_t i = 0; i < values.size(); ++i)
     if (((*present)[i].value & 0xFFFF) != (values[i].value & 0xFFFF))
@@ -171,7 +176,7 @@ Task<Result<std::string>> YakoRtuDrive::restore_factory(std::vector<std::uint8_t
   const auto kept = static_cast<std::uint64_t>(std::ranges::count_if(required_, &RegisterSetting::saved));
   const auto saves = 1 + (kept == 0 ? 0 : kept + 2);  // two turn the switch, there and back
   if (const auto permitted = permit_saves(saves); !permitted) co_return fail(permitted.error());
-  const auto before = co_await read_registers({reg::node, reg::custom_node}, reading_of_client());
+  const auto before = co_await read_registers({reg::node, reg::custom_node}, parameters());
   if (!before) co_return fail(before.error());
   const auto node = before->at(reg::node);
   const bool custom = before->at(reg::custom_node) == node;
