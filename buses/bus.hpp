@@ -62,6 +62,9 @@ class Bus {
   [[nodiscard]] virtual std::shared_ptr<StopNotice> stop_notice() const { return nullptr; }
   /// Where starts of motion keep each other from ending in time: each has its turn there. Null: they do not.
   [[nodiscard]] virtual StartTurns* start_turns() { return nullptr; }
+  /// Until the token is dropped nothing begins but stops, starts, and readings of axes that move or stop: for
+  /// a start at a moment. What is under way ends. Null: there would be nothing on the bus in the way of it.
+  virtual std::shared_ptr<void> hold() { return nullptr; }
   /// A node of this bus is about to be energised: what would be noise to it ends as superseded, unless it has
   /// gone out.
   virtual void about_to_energise() = 0;

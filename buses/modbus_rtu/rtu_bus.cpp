@@ -17,6 +17,11 @@ constexpr std::size_t size_of_read = 8, longest_reading = 40, size_of_write = 16
 /// mostly.
 constexpr Duration longest_proof = std::chrono::milliseconds(80);
 
+/// Of what may begin.
+TransactionClass lowest_class(bool held) {
+  return held ? TransactionClass::moving_state : TransactionClass::scan;
+}
+
 /// State twice, canary, block and trigger, and a reading of another axis between them, where all answer at
 /// once: 169 characters and twelve silences.
 Duration usual_start(const LineSettings& settings) {
@@ -205,6 +210,18 @@ void RtuBus::pump() {
   if (round_.empty() && port_.open) arm_next();
 }
 
+std::shared_ptr<void> RtuBus::hold() {
+  auto token = held_.lock();
+  if (token) return token;
+  token = std::shared_ptr<void>(this, [alive = std::weak_ptr(alive_)](void* bus) {
+    if (!alive.expired()) static_cast<RtuBus*>(bus)->pump();
+  });
+  held_ = token;
+  if (!round_.empty() && round_.front()->transaction_class > lowest_class(held())) take_back();
+  pump();
+  return token;
+}
+
 /// Empties the slot; what was carried out of a round by then has ended. False: something is under way. No
 /// more follows it.
 bool RtuBus::take_back() {
@@ -236,8 +253,9 @@ void RtuBus::finish(std::span<const ExchangeResult> results) {
 /// wait. Not where so many starts wait that the reading would be too old to be the proof for the next start
 /// of its axis (M6), nor in the turn of a group (M22). Each turn to start gives way to one of what waits with
 /// the readings of moving axes, and to a few that turns before it were spared: so much the published start
-/// counts.
+/// counts. Nothing gives way while the line is held for a start at a moment.
 TransactionPtr RtuBus::pop(TimePoint now) {
+  if (held()) return queue_.pop(lowest_class(true));
   if (queue_.size(TransactionClass::motion) == 0 || !starts_can_wait(now)) return queue_.pop();
   if (start_turns_.starts_of_turn() > 1) return queue_.pop();
   if (start_turns_.expected_wait() + usual_start(settings_) > longest_proof) return queue_.pop();

@@ -65,6 +65,9 @@ class RtuBus final : public Bus {
   void about_to_energise() override;
   void hasten(std::uint8_t node, TransactionClass to) override;
   [[nodiscard]] StartTurns* start_turns() override { return &start_turns_; }
+  std::shared_ptr<void> hold() override;
+  /// Somebody holds it.
+  [[nodiscard]] bool held() const { return !held_.expired(); }
   void give_up_readings(std::uint8_t node) override;
   [[nodiscard]] bool holds_back(std::uint8_t node) const override;
   [[nodiscard]] std::optional<QuarantinedNode> quarantined(std::uint8_t node) const override;
@@ -169,6 +172,8 @@ class RtuBus final : public Bus {
   bool closed_ = false;
   ExchangeObserver observer_;
   std::shared_ptr<AxisGate> override_gate_ = std::make_shared<AxisGate>();
+  std::weak_ptr<void> held_;  ///< whoever holds the line for a start
+  std::shared_ptr<int> alive_ = std::make_shared<int>();
 };
 
 }  // namespace axisd::modbus_rtu

@@ -124,14 +124,34 @@ TransactionPtr TransactionQueue::take(Transaction* transaction) {
 }
 
 TransactionPtr TransactionQueue::pop(std::optional<TimePoint> awaited_by) {
-  constexpr auto stop = static_cast<std::size_t>(TransactionClass::stop),
-                 motion = static_cast<std::size_t>(TransactionClass::motion),
+  constexpr auto motion = static_cast<std::size_t>(TransactionClass::motion),
                  readings = static_cast<std::size_t>(TransactionClass::moving_state);
-  const auto first = std::ranges::find_if(lanes_, [](const Lane& lane) { return !lane.empty(); });
-  if (first == lanes_.end()) return nullptr;
-  auto top = static_cast<std::size_t>(first - lanes_.begin());
+  const auto top = first_class();
+  if (top == lanes_.size()) return nullptr;
   const bool before_motion = top == motion && awaited_by && is_awaited(*awaited_by);
-  if (before_motion) top = readings;
+  auto transaction = give(before_motion ? readings : top);
+  transaction->reserved |= before_motion;
+  return transaction;
+}
+
+TransactionPtr TransactionQueue::pop(TransactionClass lowest) {
+  if (lowest == TransactionClass::scan) return pop();
+  const auto top = first_class();
+  if (top > static_cast<std::size_t>(lowest)) return nullptr;
+  auto transaction = take(lanes_.at(top).begin()->get());
+  transaction->reserved = false;
+  return transaction;
+}
+
+/// The highest class of which something waits, or the number of classes.
+std::size_t TransactionQueue::first_class() const {
+  const auto first = std::ranges::find_if(lanes_, [](const Lane& lane) { return !lane.empty(); });
+  return static_cast<std::size_t>(first - lanes_.begin());
+}
+
+/// The next one of class `top`, or of a class below it that has the reservation.
+TransactionPtr TransactionQueue::give(std::size_t top) {
+  constexpr auto stop = static_cast<std::size_t>(TransactionClass::stop);
   auto* chosen = &lanes_.at(top);
   auto* lower = top == stop ? nullptr : next_below(top);
   const bool reserved = lower != nullptr && ++popped_since_reservation_ >= reservation_;
@@ -141,7 +161,7 @@ TransactionPtr TransactionQueue::pop(std::optional<TimePoint> awaited_by) {
     chosen = lower;
   }
   auto transaction = take(chosen->begin()->get());
-  transaction->reserved = reserved || before_motion;
+  transaction->reserved = reserved;
   return transaction;
 }
 

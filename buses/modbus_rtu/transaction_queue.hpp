@@ -67,6 +67,8 @@ class TransactionQueue {
   /// wait; where a reading of class moving_state is awaited by then its class goes before motion. Within the
   /// class nothing changes: whoever waits for another reading is not kept waiting by it.
   TransactionPtr pop(std::optional<TimePoint> awaited_by = {});
+  /// The next one of class `lowest` or above, or nullptr; nothing goes before its turn.
+  TransactionPtr pop(TransactionClass lowest);
   /// The next one of its class, or nullptr.
   [[nodiscard]] const Transaction* next_of(TransactionClass transaction_class) const;
   /// `holds` says so of all that pop() might give out of that class.
@@ -126,6 +128,8 @@ class TransactionQueue {
   void insert(TransactionPtr transaction, bool held);
   TransactionPtr take(Transaction* transaction);
   bool merge(Transaction& transaction);
+  [[nodiscard]] std::size_t first_class() const;
+  TransactionPtr give(std::size_t top);
   [[nodiscard]] bool is_awaited(TimePoint by) const;
   Lane* next_below(std::size_t top);
 

@@ -41,6 +41,37 @@ TEST(RtuBus, ALateReplyNeverAnswersAnotherRead) {
   }
 }
 
+/// For a start at a moment.
+TEST(RtuBus, WhatIsHeldLetsGoWhatStopsStartsOrMovesAndNothingElse) {
+  BusRig rig;
+  const auto read = [&](std::uint16_t address, TransactionClass of) {
+    rig.transact(std::to_string(address), {.node = 1, .address = address, .count = 1},
+                 {.transaction_class = of});
+  };
+  read(0x0002, TransactionClass::idle_state);
+  while (rig.results.empty()) rig.world.run_for(100us);
+  rig.line->forget_wire();
+  read(0x0003, TransactionClass::idle_state);
+  rig.world.run_for(1us);  // armed; the line must be silent for a while yet
+  auto hold = rig.bus->hold();
+  EXPECT_EQ(rig.bus->hold(), hold);
+  read(0x0004, TransactionClass::parameters);
+  rig.world.run_for(50ms);
+  EXPECT_TRUE(rig.line->wire().empty());
+  read(0x0005, TransactionClass::moving_state);
+  read(0x0020, TransactionClass::motion);
+  rig.transact("stop",
+               {.node = 2, .function = Function::write_single_register, .address = 0x0028, .values = {0}},
+               {.transaction_class = TransactionClass::stop});
+  rig.world.run_for(50ms);
+  ASSERT_EQ(rig.line->wire().size(), 3U);
+  hold.reset();
+  rig.world.run_for(100ms);
+  std::vector<std::uint16_t> order;
+  for (const auto& entry : rig.line->wire()) order.push_back(entry.address());
+  EXPECT_EQ(order, (std::vector<std::uint16_t>{0x0028, 0x0020, 0x0005, 0x0003, 0x0004}));
+}
+
 /// Its stopping axis waits for it, and has nothing else under way.
 TEST(RtuBus, AReadingThatIsArmedIsHastenedThoughAStopTakesItsPlace) {
   BusRig rig;

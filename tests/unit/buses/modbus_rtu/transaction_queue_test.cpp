@@ -36,6 +36,20 @@ TEST(TransactionQueue, ClassesInStrictOrder) {
   EXPECT_EQ(queue.top_class(), std::nullopt);
 }
 
+TEST(TransactionQueue, WhatIsBelowTheLowestClassIsNotGivenOut) {
+  TransactionQueue queue(1);  // each pop would be reserved for a lower class
+  queue.push(read_of(1, Class::idle_state));
+  queue.push(read_of(2, Class::motion));
+  queue.push(read_of(3, Class::motion));
+  for (const std::uint16_t address : {2, 3}) {
+    const auto next = queue.pop(Class::motion);
+    ASSERT_NE(next, nullptr);
+    EXPECT_EQ(next->exchange.request.address, address);
+  }
+  EXPECT_EQ(queue.pop(Class::motion), nullptr);
+  EXPECT_EQ(drain(queue), (std::vector<std::uint16_t>{1}));
+}
+
 TEST(TransactionQueue, EarliestDeadlineThenArrival) {
   TransactionQueue queue;
   const TimePoint now{};
