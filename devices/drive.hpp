@@ -130,13 +130,19 @@ using ContinuityMark = std::array<std::uint16_t, 6>;
 /// waits there: dropping it leaves nothing behind. It does not outlive its drive. Thread: core.
 class PreparedMove {
  public:
+  /// When its start may go out.
+  struct StartWindow {
+    TimePoint not_before{};
+    TimePoint not_after = TimePoint::max();
+  };
   virtual ~PreparedMove() = default;
   /// Starts this one and `others`, prepared by other drives on the same bus, in the same instant: the time of
   /// it. All of them or none. Errors: superseded where one was stopped, or told something else, since; as of
   /// start_move(); invalid_argument. With an outcome other than `unknown` none has moved nor will; with
   /// `unknown` each may have started, and was told to stop: the caller confirms it. Once only; all stay alive
-  /// meanwhile. Nothing of it is sent after `not_after`: expired.
-  virtual Task<Result<TimePoint>> start_with(std::vector<PreparedMove*> others, TimePoint not_after) = 0;
+  /// meanwhile. It is not sent outside of `window` (after it: expired); before it they are looked at and
+  /// armed.
+  virtual Task<Result<TimePoint>> start_with(std::vector<PreparedMove*> others, StartWindow window) = 0;
 };
 
 /// A positioning move of which all but the trigger stands in the drive, for a trigger of its own (M6, M22).

@@ -67,9 +67,10 @@ class CanopenBus final : public Bus {
   /// Starts nodes with one SYNC: all of them, or none. The time of the SYNC: its end on the wire. Cycles of
   /// SYNC are held meanwhile, and go on afterwards at the times of before, if there are any. Errors with an
   /// outcome other than `unknown`: no SYNC was sent, and none is before each member that was armed is
-  /// settled. `unknown`: members may have started, all of them or some.
-  Task<Result<TimePoint>> start_together(std::vector<SyncStart> members) {
-    return common_start(*this, std::move(members));
+  /// settled. `unknown`: members may have started, all of them or some. The SYNC comes at `not_before` or as
+  /// soon after as possible; they are armed shortly before.
+  Task<Result<TimePoint>> start_together(std::vector<SyncStart> members, TimePoint not_before = {}) {
+    return common_start(*this, std::move(members), not_before);
   }
   /// Until the token is dropped no cycle of SYNC goes out, and nobody else holds them. Waits for whoever
   /// does, and for what is on its way.

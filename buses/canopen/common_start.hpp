@@ -28,7 +28,7 @@ struct SyncStart {
 };
 
 /// As CanopenBus::start_together().
-Task<Result<TimePoint>> common_start(CanopenBus& bus, std::vector<SyncStart> members);
+Task<Result<TimePoint>> common_start(CanopenBus& bus, std::vector<SyncStart> members, TimePoint not_before);
 
 /// Runs `function` for 0 to `count` - 1 side by side, to their ends. It outlives them.
 Task<> for_each_at_once(Executor executor, Clock& clock, std::size_t count,

@@ -17,6 +17,22 @@ bool reached(CommandState state, WaitUntil until) {
   return until == WaitUntil::started && state == CommandState::active;
 }
 
+std::function<bool(const GroupRun&)> has_come(WaitUntil until) {
+  return [until](const GroupRun& run) { return reached(run.state(), until); };
+}
+
+Error no_such_move(const std::string& id) {
+  return {.reason = Reason::unknown_command,
+          .message = fmt::format("there is no group move '{}' (any more)", id),
+          .remedy = "its commands may still be known: axisctl command get"};
+}
+
+Error shutting_down() {
+  return {.reason = Reason::cancelled,
+          .message = "the daemon is shutting down",
+          .remedy = "repeat it when it is back"};
+}
+
 }  // namespace
 
 struct GroupAccessService::Gathering {
@@ -33,8 +49,8 @@ void GroupAccessService::move(GroupMoveRequest request, CommandOptions options, 
   options.arrived = loop_->clock().now();
   post(loop_->executor(), [this, request = std::move(request), options = std::move(options), until,
                            callback = std::move(callback)]() mutable {
-    if (closing_)
-      return callback(fail(Reason::cancelled, "the daemon is shutting down", "repeat it when it is back"));
+    if (closing_) return callback(fail(shutting_down()));
+    const bool when_told = request.start == GroupStart::when_told;
     const auto first = request.targets.empty() ? std::string() : request.targets.front().axis;
     const auto group = request.group;
     const auto run = machine_->groups().move(std::move(request), options);
@@ -42,21 +58,59 @@ void GroupAccessService::move(GroupMoveRequest request, CommandOptions options, 
       machine_->audit().refused(first, GroupMemberRequest{}, options, run.error(), group);
       return callback(fail(run.error()));
     }
-    (*run)->observe([executor = loop_->executor(), until, callback](const GroupRun& now) {
-      if (!reached(now.state(), until)) return false;
-      // From a handler of its own: whoever hears of it finds the axes' states published.
-      post(executor, [callback, value = now.value()] { callback(value); });
-      return true;
-    });
+    if (when_told)
+      answer_when(*run, [](const GroupRun& now) { return now.prepared(); }, std::move(callback));
+    else
+      answer_when(*run, has_come(until), std::move(callback));
   });
+}
+
+void GroupAccessService::answer_when(const GroupRunPtr& run, std::function<bool(const GroupRun&)> reached,
+                                     Callback callback) {
+  run->observe([executor = loop_->executor(), reached = std::move(reached),
+                callback = std::move(callback)](const GroupRun& now) {
+    if (!reached(now)) return false;
+    // From a handler of its own: whoever hears of it finds the axes' states published.
+    post(executor, [callback, value = now.value()] { callback(value); });
+    return true;
+  });
+}
+
+Result<GroupRunPtr> GroupAccessService::find_own(const std::string& id, const std::string& client) const {
+  auto run = machine_->groups().find_run(id);
+  if (!run) return fail(no_such_move(id));
+  if (run->commands().front()->value().client != client)
+    return fail(Reason::access_denied, fmt::format("group move '{}' was prepared by another client", id),
+                "start and renew it as who prepared it; stop it as anybody");
+  return run;
+}
+
+void GroupAccessService::start(GroupStartRequest request, WaitUntil until, Callback callback) {
+  post(loop_->executor(),
+       [this, request = std::move(request), until, callback = std::move(callback)]() mutable {
+         if (closing_) return callback(fail(shutting_down()));
+         const auto run = find_own(request.id, request.client);
+         if (!run) return callback(fail(run.error()));
+         if (const auto told = (*run)->start_at(request.at); !told) return callback(fail(told.error()));
+         answer_when(*run, has_come(until), std::move(callback));
+       });
+}
+
+void GroupAccessService::renew(std::string id, std::string client, Callback callback) {
+  post(loop_->executor(),
+       [this, id = std::move(id), client = std::move(client), callback = std::move(callback)] {
+         const auto run = find_own(id, client);
+         if (!run) return callback(fail(run.error()));
+         (*run)->renew();
+         callback((*run)->value());
+       });
 }
 
 void GroupAccessService::get(std::string id, std::function<void(Result<GroupMove>)> callback) {
   post(loop_->executor(), [this, id = std::move(id), callback = std::move(callback)] {
     const auto run = machine_->groups().find_run(id);
     if (run) return callback(run->value());
-    callback(fail(Reason::unknown_command, fmt::format("there is no group move '{}' (any more)", id),
-                  "its commands may still be known: axisctl command get"));
+    callback(fail(no_such_move(id)));
   });
 }
 

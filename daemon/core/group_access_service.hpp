@@ -21,6 +21,9 @@ class GroupAccessService final : public GroupAccess {
   [[nodiscard]] std::vector<GroupSettings> groups() const override { return machine_->table()->groups; }
   void move(GroupMoveRequest request, CommandOptions options, WaitUntil until,
             std::function<void(Result<GroupMove>)> callback) override;
+  void start(GroupStartRequest request, WaitUntil until,
+             std::function<void(Result<GroupMove>)> callback) override;
+  void renew(std::string id, std::string client, std::function<void(Result<GroupMove>)> callback) override;
   void get(std::string id, std::function<void(Result<GroupMove>)> callback) override;
   void stop(GroupStopRequest request, std::string client, WaitUntil until,
             std::function<void(std::vector<GroupStopResult>)> callback) override;
@@ -32,6 +35,10 @@ class GroupAccessService final : public GroupAccess {
 
  private:
   struct Gathering;
+  using Callback = std::function<void(Result<GroupMove>)>;
+  void answer_when(const GroupRunPtr& run, std::function<bool(const GroupRun&)> reached, Callback callback);
+  /// Errors: unknown_command; access_denied: another client prepared it.
+  [[nodiscard]] Result<GroupRunPtr> find_own(const std::string& id, const std::string& client) const;
   /// A name that there is not, and why.
   using Unknown = std::function<void(const std::string& name, const Error& error)>;
   /// The names of axes that are known, each once.

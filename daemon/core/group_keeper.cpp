@@ -28,6 +28,7 @@ std::string text_of(const std::optional<Value>& value) {
 std::string text_of(const GroupMoveRequest& request) {
   auto text =
       fmt::format("{} {} {}", request.group, request.arrive_together, text_of(request.max_arrival_error));
+  if (request.start == GroupStart::when_told) text += " when told";
   for (const auto& target : request.targets)
     text += fmt::format("; {} {} {} {} {} {}", target.axis, text_of(target.position),
                         text_of(target.distance), text_of(target.with.velocity),

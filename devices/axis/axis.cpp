@@ -90,12 +90,12 @@ bool Axis::busy() const {
 }
 
 bool Axis::works() const {
-  const bool only_waits = queues() && !stop_.under_way() && !stop_.owed() && !terminal_motion_.moves() &&
+  const bool only_waits = bides() && !stop_.under_way() && !stop_.owed() && !terminal_motion_.moves() &&
                           !(sample_ && sample_->moving);
   return busy() && !only_waits;
 }
 
-bool Axis::queues() const { return activity_ && activity_->start.is_queued(); }
+bool Axis::bides() const { return activity_ && activity_->start.bides(); }
 
 bool Axis::at_rest() const {
   return !stop_.under_way() && !stop_.owed() && !(activity_ && activity_->state != AxisState::standstill) &&

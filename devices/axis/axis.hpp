@@ -241,10 +241,10 @@ class Axis {
   [[nodiscard]] AxisState state() const;
   [[nodiscard]] MotionCause motion_cause() const;
   [[nodiscard]] bool busy() const;
-  /// Busy, and not only because others start first.
+  /// Busy, and not only because its start bides its time.
   [[nodiscard]] bool works() const;
-  /// Its start waits for those of others: its drive rests until then.
-  [[nodiscard]] bool queues() const;
+  /// Its start waits for those of others, or for its moment: its drive rests until then.
+  [[nodiscard]] bool bides() const;
   [[nodiscard]] std::int64_t home_offset() const;
   /// This offset of the position is that of home, as far as a reading tells (M30).
   [[nodiscard]] bool is_from_home(std::int64_t offset) const;

@@ -214,6 +214,19 @@ Task<Result<void>> Axis::Member::verify() {
   co_return verified;
 }
 
+void Axis::Member::set_down(TimePoint expires) {
+  prepared_.reset();
+  loaded_.reset();
+  chain_.reset();
+  activity_->start.set_down();
+  axis_->start_by(activity_, axis_->env_.clock->now(), expires);
+}
+
+void Axis::Member::take_up(TimePoint latest) {
+  activity_->start.take_up();
+  axis_->start_by(activity_, axis_->env_.clock->now(), latest);
+}
+
 /// Where something else could have turned the shaft meanwhile: looks once more, right before the trigger.
 Task<Result<TimePoint>> Axis::Member::look_again() {
   if (!axis_->may_move_by_itself()) co_return TimePoint::max();
@@ -226,13 +239,13 @@ Task<Result<TimePoint>> Axis::Member::look_again() {
   co_return axis_->sample_->asked_at + (prepared_ ? guard / 2 : guard);
 }
 
-Task<Result<TimePoint>> Axis::Member::trigger() {
+Task<Result<TimePoint>> Axis::Member::trigger(TimePoint not_after) {
   for (int attempt = 1;; ++attempt) {
-    const auto not_after = co_await look_again();
-    if (!not_after) co_return not_after;
-    auto triggered = co_await loaded_->trigger(*not_after);
+    const auto seen_until = co_await look_again();
+    if (!seen_until) co_return seen_until;
+    auto triggered = co_await loaded_->trigger(std::min(*seen_until, not_after));
     const bool grown_old = !triggered && triggered.error().reason == Reason::expired &&
-                           axis_->env_.clock->now() < tied().not_after;
+                           axis_->env_.clock->now() < std::min(tied().not_after, not_after);
     if (!grown_old || attempt == attempts) co_return triggered;
   }
 }

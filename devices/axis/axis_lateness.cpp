@@ -8,7 +8,8 @@
 // - One that first has to end a motion (M9): a deceleration and `stop_margin` more, as the ramp is the
 // drive's.
 // - Homing that backs off first: each of its two starts on its own, the second from the end of the first.
-// - A group: its members together, axis_group.cpp.
+// - A group: its members together, axis_group.cpp. One that is to start at a moment: from that, however long
+// ago it was accepted.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -84,6 +85,10 @@ void Axis::end_late(Activity& activity) {
 /// Nothing was sent for it, as it would have been too late. `cause`: where that was found.
 Error Axis::late(const Activity& activity, Error cause) const {
   const auto waited = env_.clock->now() - activity.waits_since;
+  if (activity.start.state() == StartMachine::State::set_down)
+    return error(Reason::expired,
+                 fmt::format("it was prepared for {:.3f} s, and was not started", in_seconds(waited)),
+                 "prepare it again, and start it in time");
   auto told =
       error(Reason::expired,
             fmt::format("too late to start: it waited {:.3f} s {}, at most {:.3f} s are allowed "

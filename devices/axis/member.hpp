@@ -52,6 +52,13 @@ class Axis::Member {
   /// Why it does not start by a SYNC; empty: it does, or it needs no start.
   [[nodiscard]] const std::string& start_note() const { return start_note_; }
   Task<Result<void>> verify();
+  /// Gives the drive back until take_up(): it is read as any other, and nothing of the move stands in it that
+  /// a start could use. Not taken up by `expires`, it ends.
+  void set_down(TimePoint expires);
+  /// Its moment is near: it is loaded, looked at and verified once more, and starts by `latest`.
+  void take_up(TimePoint latest);
+  /// As Bus::hold().
+  [[nodiscard]] std::shared_ptr<void> hold_bus() const { return axis_->env_.bus->hold(); }
   /// From now on its start may have been sent.
   void about_to_start() { activity_->start.about_to_start(); }
   /// It is known that it was not.
@@ -59,7 +66,8 @@ class Axis::Member {
   /// Starts that by SYNC are bound until then: shortly after a reading, where something else could have
   /// turned the shaft; max() elsewhere. Errors: of look().
   Task<Result<TimePoint>> look_again();
-  Task<Result<TimePoint>> trigger();
+  /// Not sent after `not_after`: expired.
+  Task<Result<TimePoint>> trigger(TimePoint not_after);
   /// The start was executed.
   void started(TimePoint at);
   /// How long ago its motion was last seen, or begun; 0 where it is none of these.

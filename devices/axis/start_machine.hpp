@@ -17,6 +17,7 @@ namespace axisd {
 ///   ready, begun -- save() ---------------------> saving;  saved() leads to ready
 ///   accepted -- queue() ------------------------> queued;  has_turn() leads to accepted
 ///   ready, begun -- queue() --------------------> queued;  has_turn() leads to ready
+///   accepted -- set_down() ---------------------> set_down;  take_up() leads to accepted
 ///   accepted -- about_to_start() ---------------> ready
 ///   ready -- not_started() ---------------------> accepted
 ///   ready -- begun() ---------------------------> begun
@@ -27,6 +28,7 @@ class StartMachine {
     halting,   ///< waits for the end of the motion before it (M9)
     noting,    ///< waits for the disk; nothing of it is sent before
     queued,    ///< waits for the starts of other axes on its bus that asked before it
+    set_down,  ///< all is looked at: waits to be told when to start
     saving,    ///< waits for the disk, and its ramps may be the drive's already
     ready,     ///< its frames may be with the bus, whose gate decides
     begun,     ///< its start was sent
@@ -42,6 +44,8 @@ class StartMachine {
   void saved() { state_ = may_run() ? State::ready : State::accepted; }
   void queue() { leave_for(State::queued); }
   void has_turn() { go_back(); }
+  void set_down() { state_ = State::set_down; }
+  void take_up() { state_ = State::accepted; }
   void about_to_start() { state_ = State::ready; }
   void not_started() { state_ = State::accepted; }
   void begun() { state_ = State::begun; }
@@ -50,10 +54,12 @@ class StartMachine {
   /// Its start may have been sent: its ramps are the drive's.
   [[nodiscard]] bool may_run() const { return state_ >= State::saving; }
   [[nodiscard]] bool has_begun() const { return state_ == State::begun; }
-  [[nodiscard]] bool is_queued() const { return state_ == State::queued; }
+  /// Until its drive's turn, or moment, has come there is nothing to be read often.
+  [[nodiscard]] bool bides() const { return state_ == State::queued || state_ == State::set_down; }
   /// Nothing of it is with its bus before it has what it waits for: what moves meanwhile is not of it.
   [[nodiscard]] bool sends_nothing() const {
-    return state_ == State::noting || state_ == State::queued || state_ == State::saving;
+    return state_ == State::noting || state_ == State::queued || state_ == State::set_down ||
+           state_ == State::saving;
   }
   /// It is known to a restart, or that is under way.
   [[nodiscard]] bool is_noted() const { return noted_; }

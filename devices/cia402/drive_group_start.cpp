@@ -33,15 +33,15 @@ class Cia402Drive::Prepared final : public PreparedMove {
         guard_(std::move(guard)),
         own_(std::move(own)) {}
 
-  Task<Result<TimePoint>> start_with(std::vector<PreparedMove*> others, TimePoint not_after) override {
+  Task<Result<TimePoint>> start_with(std::vector<PreparedMove*> others, StartWindow window) override {
     auto members = members_of(others);
     if (!members) co_return fail(members.error());
-    Members all{.moves = std::move(*members), .parts = {}, .refusal = {}, .not_after = not_after};
+    Members all{.moves = std::move(*members), .parts = {}, .refusal = {}, .not_after = window.not_after};
     all.parts.resize(all.moves.size());
     co_await at_once(all, [&all](std::size_t i) { return all.moves[i]->check(all, i); });
     if (all.refusal) co_return fail(std::move(*all.refusal));
     for (auto* move : all.moves) move->begin();
-    auto started = co_await drive_->bus_->start_together(all.parts);
+    auto started = co_await drive_->bus_->start_together(all.parts, window.not_before);
     for (auto* move : all.moves) move->end();
     const bool may_run = !started && started.error().outcome == Outcome::unknown;
     if (started) co_await at_once(all, [&](std::size_t i) { return all.moves[i]->follow_up(*started); });

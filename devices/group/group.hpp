@@ -29,11 +29,18 @@ struct GroupTarget {
   MotionValues with{};                           ///< velocity and times only
 };
 
+/// When a group move starts.
+enum class GroupStart : std::uint8_t {
+  at_once,
+  when_told,  ///< at a moment that GroupAccess::start() names, once it is prepared
+};
+
 struct GroupMoveRequest {
   std::string group;                            ///< empty: the axes of the targets are one for this move
   std::vector<GroupTarget> targets;             ///< at least one, each axis once
   bool arrive_together = false;                 ///< faster axes are slowed down to the slowest
   std::optional<Duration> max_arrival_error{};  ///< in place of the group's
+  GroupStart start = GroupStart::at_once;
 };
 
 /// One member of a group move, as it stands.
@@ -46,6 +53,15 @@ struct GroupMember {
   std::optional<Duration> arrived_after{};  ///< first seen at its target, after the group's first start
 };
 
+/// Of a move that starts when told, as it stands. Moments are those of this machine's clock.
+struct GroupPreparation {
+  std::optional<TimePoint> expires{};  ///< no start later than this; nothing: it is not prepared yet
+  Duration notice{};          ///< it has to be told so long before its moment, for a last look at the members
+  Duration predicted_skew{};  ///< between the first and the last start frame
+  std::optional<TimePoint> starts_at{};    ///< once it was told
+  std::optional<TimePoint> first_start{};  ///< when its first start frame had gone out
+};
+
 struct GroupMove {
   std::string id;  ///< unique across restarts
   std::string group;
@@ -53,9 +69,10 @@ struct GroupMove {
   std::optional<Error> cause{};                 ///< what ended it, of the member that was the first
   std::vector<GroupMember> members;             ///< by name of axis
   bool arrive_together = false;
-  Duration predicted_arrival_error{};       ///< between the first and the last predicted arrival
-  std::optional<Duration> start_skew{};     ///< between the first and the last start frame
-  std::optional<Duration> arrival_error{};  ///< between the first and the last arrival seen
+  Duration predicted_arrival_error{};             ///< between the first and the last predicted arrival
+  std::optional<Duration> start_skew{};           ///< between the first and the last start frame
+  std::optional<Duration> arrival_error{};        ///< between the first and the last arrival seen
+  std::optional<GroupPreparation> preparation{};  ///< of one that starts when told
 };
 
 /// The names of these groups.
@@ -81,6 +98,13 @@ struct GroupReleaseRequest {
   HoldRelease release;  ///< the same of each
 };
 
+/// When a prepared move is to start.
+struct GroupStartRequest {
+  std::string id;
+  std::string client;  ///< who prepared it
+  TimePoint at;        ///< the moment of its first start frame
+};
+
 /// What became of one axis (or of a name that there is not) of a release.
 struct GroupReleaseResult {
   std::string axis;
@@ -100,10 +124,18 @@ class GroupAccess {
   /// Those of the configuration.
   [[nodiscard]] virtual std::vector<GroupSettings> groups() const = 0;
   /// Calls back with an error if nothing was accepted, else when all members have come as far as `until`, or
-  /// the move has ended. Errors: unknown_axis (also for groups), invalid_argument, out_of_range (the arrival
-  /// error), and those of each axis.
+  /// the move has ended; one that starts when told: when it is prepared, or has ended. Errors: unknown_axis
+  /// (also for groups), invalid_argument, out_of_range (the arrival error), and those of each axis.
   virtual void move(GroupMoveRequest request, CommandOptions options, WaitUntil until,
                     std::function<void(Result<GroupMove>)> callback) = 0;
+  /// Starts a prepared move at its moment. Calls back as move(). From then on it has to be renewed. A repeat
+  /// with the same moment attaches. Errors: unknown_command; access_denied (another client's); busy (it is
+  /// not prepared yet); expired (the moment has passed, or is too near); out_of_range (it is later than the
+  /// preparation lasts); request_id_conflict (another moment); what ended it before it was told.
+  virtual void start(GroupStartRequest request, WaitUntil until,
+                     std::function<void(Result<GroupMove>)> callback) = 0;
+  /// Whoever coordinates a prepared move still does. Errors: unknown_command, access_denied.
+  virtual void renew(std::string id, std::string client, std::function<void(Result<GroupMove>)> callback) = 0;
   /// A known group move. Errors: unknown_command.
   virtual void get(std::string id, std::function<void(Result<GroupMove>)> callback) = 0;
   /// Stops what is known, and says what is not.

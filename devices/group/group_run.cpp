@@ -44,18 +44,27 @@ std::string_view axis_of(const CommandPtr& command) { return command->value().ax
 }  // namespace
 
 GroupRun::GroupRun(Parts parts, std::vector<std::unique_ptr<Axis::Member>> members)
-    : parts_(std::move(parts)), members_(std::move(members)), by_sync_(members_.size()) {
-  auto guards = std::make_shared<std::vector<MotionGuard>>();
+    : parts_(std::move(parts)),
+      members_(std::move(members)),
+      by_sync_(members_.size()),
+      news_(parts_.executor, *parts_.clock) {
+  if (parts_.request.start == GroupStart::when_told) preparation_.emplace();
   for (const auto& member : members_) {
     member->wait_for_others(assembly_of_one * (members_.size() - 1));
     commands_.push_back(member->command());
-    guards->push_back(member->guard());
   }
-  for (const auto& member : members_) member->tie(guards, parts_.clock->now() + assembly_limit);
+  tie(parts_.clock->now() + assembly_limit);
 }
 
 GroupRun::GroupRun(Parts parts, std::vector<CommandPtr> commands)
-    : parts_(std::move(parts)), commands_(std::move(commands)) {}
+    : parts_(std::move(parts)), commands_(std::move(commands)), news_(parts_.executor, *parts_.clock) {}
+
+/// Whatever forbids one of them to start, as it stands now, forbids it to all.
+void GroupRun::tie(TimePoint not_after) {
+  auto guards = std::make_shared<std::vector<MotionGuard>>();
+  for (const auto& member : members_) guards->push_back(member->guard());
+  for (const auto& member : members_) member->tie(guards, not_after);
+}
 
 void GroupRun::watch_members() {
   for (std::size_t i = 0; i < commands_.size(); ++i)
@@ -81,7 +90,7 @@ bool GroupRun::moves(std::string_view axis) const {
 }
 
 void GroupRun::let_go() {
-  given_up_ = true;  // there is nothing to give up any more
+  machine_.give_up();  // there is nothing to give up any more
   for (const auto& member : members_) member->let_go();
 }
 
@@ -89,16 +98,20 @@ Task<> GroupRun::run() {
   const auto self = shared_from_this();
   running_ = true;
   auto failure = co_await prepare();
-  if (!failure && !given_up_) failure = co_await start();
-  // On several lines it waited for one while it had the turn on another.
-  if (!failure && turns_.size() == 1) turns_.front().done();
+  if (!failure && preparation_) failure = co_await await_moment();
+  if (!preparation_) machine_.begin();
+  if (!failure && !given_up()) failure = co_await start();
+  hold_.reset();
+  // On several lines it waited for one while it had the turn on another, or it waited for its moment.
+  if (!failure && turns_.size() == 1 && !preparation_) turns_.front().done();
   turns_.clear();
   if (failure) give_up(*failure);
-  if (!given_up_)
+  machine_.all_started();
+  if (!given_up())
     for (const auto& member : members_) member->follow();
   tell();
   for (const auto& member : members_)
-    if (!given_up_) co_await member->follow_up();
+    if (!given_up()) co_await member->follow_up();
   running_ = false;
 }
 
@@ -130,18 +143,33 @@ GroupRun::Failure GroupRun::attributed(std::size_t member, Error cause) const {
 }
 
 Task<GroupRun::MaybeFailure> GroupRun::prepare() {
-  if (auto failure = co_await each(&Axis::Member::note); failure || given_up_) co_return failure;
+  if (auto failure = co_await each(&Axis::Member::note); failure || given_up()) co_return failure;
+  const auto wait = [this](bool waits) {
+    for (const auto& member : members_)
+      if (member->start_turns() != nullptr) member->waits_for_turn(waits);
+  };
+  wait(true);
   co_await take_turns();
-  if (given_up_) co_return std::nullopt;
-  for (const Step step : {&Axis::Member::load, &Axis::Member::look, &Axis::Member::verify})
-    if (auto failure = co_await each(step); failure || given_up_) co_return failure;
+  if (given_up()) co_return std::nullopt;
+  wait(false);
+  co_return co_await examine();
+}
+
+Task<GroupRun::MaybeFailure> GroupRun::examine() {
+  const auto began = parts_.clock->now();
+  for (const Step step : {&Axis::Member::load, &Axis::Member::look})
+    if (auto failure = co_await each(step); failure || given_up()) co_return failure;
+  const auto read = parts_.clock->now();
+  if (auto failure = co_await each(&Axis::Member::verify); failure || given_up()) co_return failure;
+  const auto now = parts_.clock->now();
+  if (preparation_) note_times(now - began, now - read);
   co_return check_arrival();
 }
 
 Task<GroupRun::MaybeFailure> GroupRun::each(Step step) {
   for (std::size_t i = 0; i < members_.size(); ++i) {
     if (const auto done = co_await ((*members_[i]).*step)(); !done) co_return attributed(i, done.error());
-    if (given_up_) co_return std::nullopt;
+    if (given_up()) co_return std::nullopt;
   }
   co_return unready();
 }
@@ -158,17 +186,14 @@ Task<> GroupRun::take_turns() {
     auto* turns = member->start_turns();
     if (turns == nullptr) continue;
     ++lines.try_emplace(member->axis().settings().bus, turns).first->second.members;
-    member->waits_for_turn(true);
   }
   // Its places on all lines at once: nobody who asks later passes it while it waits for another line.
   for (const auto& [name, line] : lines) turns_.push_back(line.turns->announce(line.members));
   auto turn = turns_.begin();
   for (const auto& [name, line] : lines) {
     co_await line.turns->take(*turn++);
-    if (given_up_) co_return;
+    if (given_up()) co_return;
   }
-  for (const auto& member : members_)
-    if (member->start_turns() != nullptr) member->waits_for_turn(false);
 }
 
 /// Once more: where the members really stand decides.
@@ -201,19 +226,28 @@ std::vector<std::vector<std::size_t>> GroupRun::common_starts() const {
 }
 
 Task<GroupRun::MaybeFailure> GroupRun::start() {
+  // Of the first one: the others follow as fast as their buses are.
+  PreparedMove::StartWindow window;
+  if (preparation_)
+    window = {.not_before = *preparation_->starts_at, .not_after = *preparation_->starts_at + latest_start};
   for (auto& together : common_starts())
-    if (auto failure = co_await start_by_sync(std::move(together)); failure || given_up_) co_return failure;
+    if (auto failure = co_await start_by_sync(std::move(together), std::exchange(window, {}));
+        failure || given_up())
+      co_return failure;
   for (std::size_t i = 0; i < members_.size(); ++i) {
     auto& member = *members_[i];
     if (member.there() || member.prepared() != nullptr) continue;
+    if (window.not_before != TimePoint{})
+      if (auto failure = co_await approach(i); failure || given_up()) co_return failure;
     if (auto lost = unready()) co_return lost;
     member.about_to_start();
-    const auto at = co_await member.trigger();
+    const auto at = co_await member.trigger(std::exchange(window, {}).not_after);
+    hold_.reset();
     if (!at && at.error().outcome != Outcome::unknown) member.not_started();
-    if (given_up_) co_return std::nullopt;  // it got its stop then
+    if (given_up()) co_return std::nullopt;  // it got its stop then
     if (!at) co_return attributed(i, at.error());
     member.started(*at);
-    if (auto failure = co_await look_after_the_started(); failure || given_up_) co_return failure;
+    if (auto failure = co_await look_after_the_started(); failure || given_up()) co_return failure;
   }
   co_return std::nullopt;
 }
@@ -228,18 +262,19 @@ Task<GroupRun::MaybeFailure> GroupRun::look_after_the_started() {
   if (oldest.unseen_for() <= std::max<Duration>(oldest.axis().settings().poll_moving, longest_unseen))
     co_return std::nullopt;
   const auto seen = co_await oldest.look_after();
-  if (seen || given_up_) co_return std::nullopt;
+  if (seen || given_up()) co_return std::nullopt;
   co_return attributed(member, seen.error());
 }
 
-Task<GroupRun::MaybeFailure> GroupRun::start_by_sync(std::vector<std::size_t> together) {
+Task<GroupRun::MaybeFailure> GroupRun::start_by_sync(std::vector<std::size_t> together,
+                                                     PreparedMove::StartWindow window) {
+  if (window.not_before != TimePoint{}) co_await pause_until(window.not_before - sync_approach());
   if (auto lost = unready()) co_return lost;
-  auto not_after = TimePoint::max();
   for (const auto i : together) {
     const auto until = co_await members_[i]->look_again();
-    if (given_up_) co_return std::nullopt;
+    if (given_up()) co_return std::nullopt;
     if (!until) co_return attributed(i, until.error());
-    not_after = std::min(not_after, *until);
+    window.not_after = std::min(window.not_after, *until);
   }
   if (auto lost = unready()) co_return lost;
   std::vector<PreparedMove*> others;
@@ -247,10 +282,10 @@ Task<GroupRun::MaybeFailure> GroupRun::start_by_sync(std::vector<std::size_t> to
     members_[i]->about_to_start();
     if (i != together.front()) others.push_back(members_[i]->prepared());
   }
-  const auto at = co_await members_[together.front()]->prepared()->start_with(std::move(others), not_after);
+  const auto at = co_await members_[together.front()]->prepared()->start_with(std::move(others), window);
   if (!at && at.error().outcome != Outcome::unknown)
     for (const auto i : together) members_[i]->not_started();
-  if (given_up_) co_return std::nullopt;
+  if (given_up()) co_return std::nullopt;
   if (at) {
     for (const auto i : together) {
       by_sync_[i] = true;
@@ -273,12 +308,9 @@ std::size_t GroupRun::member_at(const Address& where, const std::vector<std::siz
 
 /// Those that may move first, and at once: all of these stops are queued before anything else happens.
 void GroupRun::give_up(const Failure& failure) {
-  if (std::exchange(given_up_, true)) return;
-  turns_.clear();
+  if (given_up()) return;
   const std::string axis(axis_of(commands_[failure.member]));
-  if (std::ranges::any_of(commands_, [](const auto& command) { return !command->has_ended(); }))
-    spdlog::warn("group move {} ends: {}", parts_.id, to_string(failure.cause));
-  cause_ = named(failure.cause, axis);
+  begin_to_give_up(named(failure.cause, axis));
   const auto others = because_of(failure.cause, axis);
   const bool culprit_may_run = members_[failure.member]->may_run();
   if (culprit_may_run) members_[failure.member]->end_failed(failure.cause);
@@ -286,6 +318,26 @@ void GroupRun::give_up(const Failure& failure) {
     for (const auto& member : members_)
       if (member != members_[failure.member] && member->may_run() == moving) member->end_aborted(others);
   if (!culprit_may_run) members_[failure.member]->end_failed(failure.cause);
+}
+
+/// Nobody's fault among them.
+void GroupRun::give_up(const Error& common) {
+  if (given_up()) return;
+  begin_to_give_up(common);
+  for (const bool moving : {true, false})
+    for (const auto& member : members_)
+      if (member->may_run() == moving) member->end_aborted(common);
+}
+
+void GroupRun::begin_to_give_up(Error cause) {
+  machine_.give_up();
+  turns_.clear();
+  hold_.reset();
+  unrenewed_.reset();
+  news_.notify_all();
+  if (std::ranges::any_of(commands_, [](const auto& command) { return !command->has_ended(); }))
+    spdlog::warn("group move {} ends: {}", parts_.id, to_string(cause));
+  cause_ = std::move(cause);
 }
 
 void GroupRun::observe(Observer observer) {
@@ -296,54 +348,6 @@ void GroupRun::tell() {
   auto observers = std::exchange(observers_, {});
   std::erase_if(observers, [this](const Observer& observer) { return observer(*this); });
   observers_.insert(observers_.begin(), observers.begin(), observers.end());
-}
-
-CommandState GroupRun::state() const {
-  const auto any = [this](CommandState state) {
-    return std::ranges::any_of(commands_, [&](const auto& c) { return c->value().state == state; });
-  };
-  // While one has not ended, the move has not, either.
-  const bool over = std::ranges::all_of(commands_, [](const auto& command) { return command->has_ended(); });
-  if (!over) return any(CommandState::accepted) ? CommandState::accepted : CommandState::active;
-  for (const auto worst : {CommandState::unknown, CommandState::error, CommandState::aborted})
-    if (any(worst)) return worst;
-  return CommandState::done;
-}
-
-GroupMove GroupRun::value() const {
-  GroupMove move{.id = parts_.id,
-                 .group = parts_.request.group,
-                 .state = state(),
-                 .cause = cause_,
-                 .arrive_together = parts_.request.arrive_together};
-  std::vector<Duration> predicted;
-  std::vector<TimePoint> starts, arrivals;
-  bool all_arrived = !members_.empty();
-  for (const auto& member : members_) {
-    predicted.push_back(member->predicted());
-    if (member->started_at()) starts.push_back(*member->started_at());
-    if (member->arrived_at()) arrivals.push_back(*member->arrived_at());
-    all_arrived = all_arrived && (member->there() || member->arrived_at());
-  }
-  const auto first = starts.empty() ? TimePoint{} : std::ranges::min(starts);
-  for (std::size_t i = 0; i < commands_.size(); ++i) {
-    auto& entry = move.members.emplace_back(GroupMember{.command = commands_[i]->value()});
-    if (members_.empty()) continue;
-    const auto& member = *members_[i];
-    entry.predicted = member.predicted();
-    entry.by_sync = by_sync_[i];
-    entry.note = member.start_note();
-    if (member.started_at()) entry.started_after = *member.started_at() - first;
-    if (member.arrived_at()) entry.arrived_after = *member.arrived_at() - first;
-  }
-  move.predicted_arrival_error = arrival_error(predicted);
-  const bool all_started = !members_.empty() && std::ranges::all_of(members_, [](const auto& m) {
-    return m->there() || m->started_at();
-  });
-  if (all_started && !starts.empty()) move.start_skew = std::ranges::max(starts) - first;
-  if (all_arrived && !arrivals.empty())
-    move.arrival_error = std::ranges::max(arrivals) - std::ranges::min(arrivals);
-  return move;
 }
 
 }  // namespace axisd

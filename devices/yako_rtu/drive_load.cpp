@@ -60,10 +60,11 @@ class YakoRtuDrive::Loaded final : public LoadedMove {
   }
 
  private:
-  /// With what the line may still have to do before it: a reading of another axis.
+  /// With what the line may still have to do before it, unless it is held: a reading of an axis at rest.
   [[nodiscard]] Duration time_to_trigger() const {
     const auto& line = drive_->node_.bus().settings();
-    const auto reading = transactions.state;
+    const auto reading =
+        drive_->node_.bus().held() ? ExchangeSize{.request = 0, .reply = 0} : transactions.state;
     const ExchangeSize trigger{};
     return modbus_rtu::wire_time(line, std::size_t{reading.request} + reading.reply + trigger.request) +
            2 * modbus_rtu::silence(line) + drive_->setup_.reboot_guard / 10;

@@ -21,7 +21,16 @@ void Client::wait() {
   });
 }
 
+/// Mostly in time.
+void Client::coordinate() {
+  const auto run = prepared_.lock();
+  if (!run) return;
+  run->renew();
+  if (run->prepared() && dice_.chance(0.7)) (void)run->start_at(plant_->world.now() + dice_.up_to(1500ms));
+}
+
 void Client::act() {
+  coordinate();
   auto& station =
       plant_->stations.at(static_cast<std::size_t>(dice_.pick(static_cast<int>(plant_->stations.size()))));
   const int what = dice_.pick(100);
@@ -63,9 +72,11 @@ void Client::move_group() {
     request.targets.push_back(std::move(target));
   }
   if (request.targets.empty()) return;
+  if (dice_.chance(0.4)) request.start = GroupStart::when_told;
   const auto run = plant_->machine->groups().move(
       request, {.client = name_, .request_id = fmt::format("{}-{}", name_, ++requests_)});
   if (!run) return;
+  if (request.start == GroupStart::when_told) prepared_ = *run;
   for (const auto& command : (*run)->commands()) judge_->accepted(command);
 }
 

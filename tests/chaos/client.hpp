@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -26,6 +27,7 @@ class Client {
   void stop(Station& station);
   void stop_all();
   void move_group();
+  void coordinate();
   void read_marks(const Station& station);
   void submit(const Station& station, const Action& action);
   void repeat();
@@ -44,6 +46,7 @@ class Client {
   std::string name_;
   Dice dice_;
   std::optional<Submitted> last_;
+  std::weak_ptr<GroupRun> prepared_;  ///< the last; not over a restart of the daemon
   int requests_ = 0;
   Clock::Timer next_;
   std::vector<Clock::Timer> later_;

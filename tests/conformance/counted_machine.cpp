@@ -186,6 +186,15 @@ class CountedGroups final : public GroupAccess {
       inner_->move(request, options, until, ledger_->answer(ticket, callback));
     });
   }
+  void start(GroupStartRequest request, WaitUntil until,
+             std::function<void(Result<GroupMove>)> callback) override {
+    ledger_->enter(
+        [=, this](const auto& ticket) { inner_->start(request, until, ledger_->answer(ticket, callback)); });
+  }
+  void renew(std::string id, std::string client, std::function<void(Result<GroupMove>)> callback) override {
+    ledger_->enter(
+        [=, this](const auto& ticket) { inner_->renew(id, client, ledger_->answer(ticket, callback)); });
+  }
   void get(std::string id, std::function<void(Result<GroupMove>)> callback) override {
     ledger_->enter([=, this](const auto& ticket) { inner_->get(id, ledger_->answer(ticket, callback)); });
   }

@@ -136,7 +136,7 @@ class GroupBench {
   [[nodiscard]] Task<Result<TimePoint>> start_all() {
     std::vector<PreparedMove*> others;
     for (std::size_t i = 1; i < members.size(); ++i) others.push_back(members[i].move.get());
-    return members.front().move->start_with(std::move(others), TimePoint::max());
+    return members.front().move->start_with(std::move(others), {});
   }
   Result<TimePoint> start() { return finish(start_all()); }
   /// Begins it, and says there how it ended.

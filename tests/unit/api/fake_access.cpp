@@ -312,12 +312,18 @@ void FakeGroups::move(GroupMoveRequest request, CommandOptions options, WaitUnti
     targets +=
         fmt::format(" {}{}{}", target.axis,
                     target.position ? "=" : "+=", target.position.value_or(target.distance.value_or(0)));
-  note(fmt::format("move {}{} together {} within {} by {} as {} until {}", request.group, targets,
-                   request.arrive_together, request.max_arrival_error.value_or(-1ms) / 1ms, options.client,
-                   options.request_id, static_cast<int>(until)));
+  const bool when_told = request.start == GroupStart::when_told;
+  note(fmt::format("{} {}{} together {} within {} by {} as {} until {}", when_told ? "prepare" : "move",
+                   request.group, targets, request.arrive_together,
+                   request.max_arrival_error.value_or(-1ms) / 1ms, options.client, options.request_id,
+                   static_cast<int>(until)));
+  std::optional<GroupPreparation> preparation;
+  if (when_told)
+    preparation = {
+        .expires = TimePoint(9s), .notice = 80ms, .predicted_skew = 4ms, .first_start = TimePoint(8s)};
   answer<GroupMove>(callback, GroupMove{.id = "g-1",
                                         .group = request.group,
-                                        .state = CommandState::done,
+                                        .state = when_told ? CommandState::accepted : CommandState::done,
                                         .members = {{.command = {.id = "c-1", .axis = "feeder"},
                                                      .predicted = 1500ms,
                                                      .by_sync = true,
@@ -327,7 +333,20 @@ void FakeGroups::move(GroupMoveRequest request, CommandOptions options, WaitUnti
                                         .arrive_together = request.arrive_together,
                                         .predicted_arrival_error = 1ms,
                                         .start_skew = 5ms,
-                                        .arrival_error = 7ms});
+                                        .arrival_error = 7ms,
+                                        .preparation = preparation});
+}
+
+void FakeGroups::start(GroupStartRequest request, WaitUntil until,
+                       std::function<void(Result<GroupMove>)> callback) {
+  note(fmt::format("start {} at {} by {} until {}", request.id, request.at.time_since_epoch() / 1ms,
+                   request.client, static_cast<int>(until)));
+  answer<GroupMove>(callback, GroupMove{.id = request.id, .preparation = {{.starts_at = request.at}}});
+}
+
+void FakeGroups::renew(std::string id, std::string client, std::function<void(Result<GroupMove>)> callback) {
+  note(fmt::format("renew {} by {}", id, client));
+  answer<GroupMove>(callback, GroupMove{.id = id});
 }
 
 void FakeGroups::get(std::string id, std::function<void(Result<GroupMove>)> callback) {

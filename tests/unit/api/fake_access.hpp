@@ -155,6 +155,9 @@ class FakeGroups final : public FakeAccess, public GroupAccess {
   [[nodiscard]] std::vector<GroupSettings> groups() const override { return groups_; }
   void move(GroupMoveRequest request, CommandOptions options, WaitUntil until,
             std::function<void(Result<GroupMove>)> callback) override;
+  void start(GroupStartRequest request, WaitUntil until,
+             std::function<void(Result<GroupMove>)> callback) override;
+  void renew(std::string id, std::string client, std::function<void(Result<GroupMove>)> callback) override;
   void get(std::string id, std::function<void(Result<GroupMove>)> callback) override;
   void stop(GroupStopRequest request, std::string client, WaitUntil until,
             std::function<void(std::vector<GroupStopResult>)> callback) override;

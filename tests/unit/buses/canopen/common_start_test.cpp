@@ -54,7 +54,7 @@ struct Start {
   }
   void launch() {
     const auto store = [](Start& self, std::vector<SyncStart> all) -> Task<> {
-      self.result = co_await self.bus->start_together(std::move(all));
+      self.result = co_await self.bus->start_together(std::move(all), self.not_before);
     };
     result.reset();
     spawn(world.executor(), store(*this, members()), "test");
@@ -76,6 +76,7 @@ struct Start {
   std::vector<std::shared_ptr<AxisGate>> gates;
   std::set<std::uint8_t> deaf;
   std::function<void(std::uint8_t)> on_confirm;
+  TimePoint not_before{};
   std::optional<Result<TimePoint>> result;
 };
 
@@ -110,6 +111,37 @@ TEST(CommonStart, CyclesGoOnAtTheirTimesAndNoneComesBetween) {
     EXPECT_GE(time - *at, 5ms);
   }
   EXPECT_EQ(start.bus->master().sync().counters().missed, 0U);
+}
+
+TEST(CommonStart, TheSyncComesAtItsMomentAndNodesAreArmedShortlyBefore) {
+  Start start(10ms);
+  start.world.run_for(25ms);
+  start.port->log.clear();
+  start.port->times.clear();
+  start.not_before = start.world.now() + 43ms;
+  start.launch();
+  start.world.run_for(36ms);
+  EXPECT_TRUE(start.port->log.empty()) << "cycles are held";
+  const auto at = start.finish();
+  ASSERT_TRUE(at);
+  EXPECT_THAT(start.port->log, ElementsAre("305#1F00", "306#1F00", "080#"));
+  EXPECT_EQ(*at, start.not_before + 100us) << "the frame takes its time";
+  EXPECT_GE(start.port->times.front(), start.not_before - 5ms);
+}
+
+TEST(CommonStart, AStopBetweenArmingAndTheMomentStartsNobody) {
+  Start start(10ms);
+  start.not_before = start.world.now() + 20ms;
+  start.launch();
+  start.world.run_for(18ms);
+  ASSERT_TRUE(start.bus->armed(5));
+  start.gates.front()->raise();
+  const auto result = start.finish();
+  ASSERT_FALSE(result);
+  EXPECT_EQ(result.error().reason, Reason::superseded);
+  EXPECT_NE(result.error().outcome, Outcome::unknown);
+  start.world.run_for(100ms);
+  EXPECT_EQ(start.port->log.back(), "306#0F01") << "neutralised, and no cycle before they are settled";
 }
 
 TEST(CommonStart, WaitsForASyncThatIsOnItsWay) {

@@ -77,6 +77,18 @@ TEST(StartMachine, WhatStartsNoMotionIsNotedAndStaysAccepted) {
   EXPECT_FALSE(start.note());
 }
 
+TEST(StartMachine, WhatIsSetDownSendsNothingUntilItIsTakenUp) {
+  StartMachine start;
+  start.set_down();
+  EXPECT_EQ(start.state(), State::set_down);
+  EXPECT_TRUE(start.waits());
+  EXPECT_TRUE(start.bides());
+  EXPECT_TRUE(start.sends_nothing());
+  EXPECT_FALSE(start.may_run());
+  start.take_up();
+  EXPECT_EQ(start.state(), State::accepted);
+}
+
 TEST(StartMachine, ItWaitsForItsTurn) {
   auto start = ready();
   start.queue();
