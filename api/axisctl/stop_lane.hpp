@@ -33,6 +33,8 @@ inline constexpr auto on_stop_lane<v1::StopAllRequest> = &v1::StopService::Stub:
 template <>
 inline constexpr auto on_stop_lane<v1::RenewLeaseRequest> = &v1::StopService::Stub::RenewLease;
 template <>
+inline constexpr auto on_stop_lane<v1::RenewPreparedRequest> = &v1::StopService::Stub::RenewPrepared;
+template <>
 inline constexpr auto on_stop_lane<v1::CancelCommandRequest> = &v1::StopService::Stub::CancelCommand;
 
 /// Where a daemon takes stops, unless its configuration says otherwise (stop_service.proto); empty: `server`

@@ -47,10 +47,11 @@ bool is_stop(std::string_view path) {
 }
 
 bool is_never_counted(std::string_view path) {
-  constexpr std::array<std::string_view, 6> others{
+  constexpr std::array<std::string_view, 7> others{
       "/axisd.v1.AxisService/Disable",           "/axisd.v1.AxisService/ReleaseStop",
-      "/axisd.v1.GroupService/GroupReleaseStop", "/axisd.v1.LeaseService/RenewLease",
-      "/axisd.v1.LeaseService/ReleaseLease",     "/axisd.v1.CommandService/CancelCommand"};
+      "/axisd.v1.GroupService/GroupReleaseStop", "/axisd.v1.GroupService/RenewPrepared",
+      "/axisd.v1.LeaseService/RenewLease",       "/axisd.v1.LeaseService/ReleaseLease",
+      "/axisd.v1.CommandService/CancelCommand"};
   return is_stop(path) || is_for_lane(path) || std::ranges::find(others, path) != others.end();
 }
 

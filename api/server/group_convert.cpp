@@ -60,6 +60,26 @@ Result<GroupMoveRequest> to_request(const v1::MoveGroupRequest& from) {
   return request;
 }
 
+Result<GroupMoveRequest> to_request(const v1::PrepareMoveRequest& from) {
+  if (from.move().options().wait_until() != v1::WAIT_UNTIL_UNSPECIFIED)
+    return fail(Reason::invalid_argument, "move.options.wait_until has no meaning here",
+                "leave it out: the answer comes when the move is prepared, or has ended");
+  auto request = to_request(from.move());
+  if (request) request->start = GroupStart::when_told;
+  return request;
+}
+
+Result<GroupStartRequest> to_request(const v1::StartPreparedRequest& from, std::string client) {
+  if (auto valid = check_command_id(from.id()); !valid) return fail(valid.error());
+  const auto at = from_proto(from.at());
+  if (!from.has_at() || !at || *at <= Duration{})
+    return fail(Reason::invalid_argument, "at is no moment",
+                "give one of this machine's clock; see PrepareMove");
+  return GroupStartRequest{.id = from.id(), .client = std::move(client), .at = TimePoint(*at)};
+}
+
+void to_proto(TimePoint from, google::protobuf::Duration& to) { to_proto(from.time_since_epoch(), to); }
+
 Error nothing_named() {
   return {.reason = Reason::invalid_argument,
           .message = "neither a group nor an axis is named",
@@ -70,6 +90,14 @@ void to_proto(const GroupSettings& from, v1::Group& to) {
   to.set_name(from.name);
   for (const auto& axis : from.axes) to.add_axes(axis);
   if (from.max_arrival_error) to_proto(*from.max_arrival_error, *to.mutable_max_arrival_error());
+}
+
+void to_proto(const GroupPreparation& from, v1::Preparation& to) {
+  if (from.expires) to_proto(*from.expires, *to.mutable_expires());
+  to_proto(from.notice, *to.mutable_notice());
+  to_proto(from.predicted_skew, *to.mutable_predicted_start_skew());
+  if (from.starts_at) to_proto(*from.starts_at, *to.mutable_starts_at());
+  if (from.first_start) to_proto(*from.first_start, *to.mutable_first_start());
 }
 
 void to_proto(const GroupMove& from, v1::GroupMove& to) {
@@ -90,6 +118,7 @@ void to_proto(const GroupMove& from, v1::GroupMove& to) {
   to_proto(from.predicted_arrival_error, *to.mutable_predicted_arrival_error());
   if (from.start_skew) to_proto(*from.start_skew, *to.mutable_start_skew());
   if (from.arrival_error) to_proto(*from.arrival_error, *to.mutable_arrival_error());
+  if (from.preparation) to_proto(*from.preparation, *to.mutable_preparation());
 }
 
 void to_proto(const GroupStopResult& from, v1::GroupStopResult& to) {

@@ -20,10 +20,27 @@
 
 namespace axisd::server {
 
+namespace {
+
+/// With the machine's clock, where the response has a place for it.
+template <class Response>
+void fill(Response& response, const GroupMove& move, [[maybe_unused]] const Machine& machine) {
+  to_proto(move, *response.mutable_move());
+  if constexpr (requires { response.mutable_clock(); }) to_proto(machine.now(), *response.mutable_clock());
+}
+
+template <class Response>
+auto told(const Machine& machine, Response* response) {
+  return [&machine, response](const GroupMove& move) { fill(*response, move, machine); };
+}
+
+}  // namespace
+
 GroupServiceImpl::GroupServiceImpl(const Services& services) : BoundedService(services), services_(services) {
-  begin_within_bounds(&GroupServiceImpl::ListGroups, &GroupServiceImpl::MoveGroup,
-                      &GroupServiceImpl::GetGroupMove, &GroupServiceImpl::GroupHalt,
-                      &GroupServiceImpl::GroupStop, &GroupServiceImpl::GroupReleaseStop);
+  begin_within_bounds(
+      &GroupServiceImpl::ListGroups, &GroupServiceImpl::MoveGroup, &GroupServiceImpl::PrepareMove,
+      &GroupServiceImpl::StartPrepared, &GroupServiceImpl::RenewPrepared, &GroupServiceImpl::GetGroupMove,
+      &GroupServiceImpl::GroupHalt, &GroupServiceImpl::GroupStop, &GroupServiceImpl::GroupReleaseStop);
 }
 
 GroupServiceImpl::Reactor* GroupServiceImpl::ListGroups(Context* context, const v1::ListGroupsRequest*,
@@ -33,13 +50,13 @@ GroupServiceImpl::Reactor* GroupServiceImpl::ListGroups(Context* context, const 
   return answer(context, grpc::Status::OK);
 }
 
-GroupServiceImpl::Reactor* GroupServiceImpl::MoveGroup(Context* context, const v1::MoveGroupRequest* request,
-                                                       v1::MoveGroupResponse* response) {
-  const auto caller = who_asks(*context, *request);
+template <class Response>
+GroupServiceImpl::Reactor* GroupServiceImpl::move(Context* context, Result<GroupMoveRequest> wanted,
+                                                  const v1::CommandOptions& options, const Caller& caller,
+                                                  std::string what, Response* response) {
   const auto& client = caller.name;
-  auto wanted = to_request(*request);
   if (!wanted) return answer(context, to_status(wanted.error()));
-  auto submission = motion_options(request->options(), client, services_.machine);
+  auto submission = motion_options(options, client, services_.machine);
   if (!submission) return answer(context, to_status(submission.error()));
   submission->options.origin = caller.origin;
   if (const auto patience = patience_of(*context))
@@ -48,12 +65,51 @@ GroupServiceImpl::Reactor* GroupServiceImpl::MoveGroup(Context* context, const v
   if (!ticket) return answer(context, to_status(ticket.error()));
   return PendingCall::start(
       services_, context, *std::move(ticket), [&](const std::shared_ptr<PendingCall>& call) {
+        what = fmt::format("{}: {} {}", client, what, wanted->group);
         services_.machine.group_access().move(
             *std::move(wanted), std::move(submission->options), submission->until,
-            reply_with_value<GroupMove>(
-                call, [response](const GroupMove& move) { to_proto(move, *response->mutable_move()); },
-                fmt::format("{}: move_group {}", client, request->group())));
+            reply_with_value<GroupMove>(call, told(services_.machine, response), std::move(what)));
       });
+}
+
+GroupServiceImpl::Reactor* GroupServiceImpl::MoveGroup(Context* context, const v1::MoveGroupRequest* request,
+                                                       v1::MoveGroupResponse* response) {
+  return move(context, to_request(*request), request->options(), who_asks(*context, *request), "move_group",
+              response);
+}
+
+GroupServiceImpl::Reactor* GroupServiceImpl::PrepareMove(Context* context,
+                                                         const v1::PrepareMoveRequest* request,
+                                                         v1::PrepareMoveResponse* response) {
+  return move(context, to_request(*request), request->move().options(), who_asks(*context, *request),
+              "prepare_move", response);
+}
+
+GroupServiceImpl::Reactor* GroupServiceImpl::StartPrepared(Context* context,
+                                                           const v1::StartPreparedRequest* request,
+                                                           v1::StartPreparedResponse* response) {
+  const auto client = client_of(*context);
+  auto wanted = to_request(*request, client);
+  if (!wanted) return answer(context, to_status(wanted.error()));
+  const auto until = wait_until(request->wait_until());
+  if (!until) return answer(context, to_status(until.error()));
+  auto ticket = services_.admission.admit(client, Admission::Kind::motion);
+  if (!ticket) return answer(context, to_status(ticket.error()));
+  return PendingCall::start(
+      services_, context, *std::move(ticket), [&](const std::shared_ptr<PendingCall>& call) {
+        auto what = fmt::format("{}: start_prepared {}", client, wanted->id);
+        services_.machine.group_access().start(
+            *std::move(wanted), *until,
+            reply_with_value<GroupMove>(call, told(services_.machine, response), std::move(what)));
+      });
+}
+
+GroupServiceImpl::Reactor* GroupServiceImpl::RenewPrepared(Context* context,
+                                                           const v1::RenewPreparedRequest* request,
+                                                           v1::RenewPreparedResponse* response) {
+  return PendingCall::start(services_, context, {}, [&](const std::shared_ptr<PendingCall>& call) {
+    handle(services_.machine, *request, who_asks(*context, *request), call, response);
+  });
 }
 
 GroupServiceImpl::Reactor* GroupServiceImpl::GetGroupMove(Context* context,

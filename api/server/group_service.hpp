@@ -18,6 +18,12 @@ class GroupServiceImpl final : public BoundedService<v1::GroupService::CallbackS
                       v1::ListGroupsResponse* response) override;
   Reactor* MoveGroup(Context* context, const v1::MoveGroupRequest* request,
                      v1::MoveGroupResponse* response) override;
+  Reactor* PrepareMove(Context* context, const v1::PrepareMoveRequest* request,
+                       v1::PrepareMoveResponse* response) override;
+  Reactor* StartPrepared(Context* context, const v1::StartPreparedRequest* request,
+                         v1::StartPreparedResponse* response) override;
+  Reactor* RenewPrepared(Context* context, const v1::RenewPreparedRequest* request,
+                         v1::RenewPreparedResponse* response) override;
   Reactor* GetGroupMove(Context* context, const v1::GetGroupMoveRequest* request,
                         v1::GetGroupMoveResponse* response) override;
   Reactor* GroupHalt(Context* context, const v1::GroupHaltRequest* request,
@@ -28,6 +34,10 @@ class GroupServiceImpl final : public BoundedService<v1::GroupService::CallbackS
                             v1::GroupReleaseStopResponse* response) override;
 
  private:
+  template <class Response>
+  Reactor* move(Context* context, Result<GroupMoveRequest> wanted, const v1::CommandOptions& options,
+                const Caller& caller, std::string what, Response* response);
+
   const Services services_;
 };
 

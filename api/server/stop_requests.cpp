@@ -165,6 +165,18 @@ void handle(Machine& machine, const v1::RenewLeaseRequest& request, const Caller
                                }));
 }
 
+void handle(Machine& machine, const v1::RenewPreparedRequest& request, const Caller& caller,
+            const ReplyPtr& reply, v1::RenewPreparedResponse* response) {
+  if (const auto valid = check_command_id(request.id()); !valid)
+    return refuse(reply, caller.name, "renew", valid.error());
+  machine.group_access().renew(
+      request.id(), caller.name,
+      reply_with_value<GroupMove>(reply, [response, &machine](const GroupMove& move) {
+        to_proto(move, *response->mutable_move());
+        to_proto(machine.now(), *response->mutable_clock());
+      }));
+}
+
 void handle(Machine& machine, const v1::CancelCommandRequest& request, const Caller& caller,
             const ReplyPtr& reply, v1::CancelCommandResponse* response) {
   if (const auto valid = check_command_id(request.id()); !valid)

@@ -30,6 +30,8 @@ void handle(Machine& machine, const v1::StopAllRequest& request, const Caller& c
             v1::StopAllResponse* response);
 void handle(Machine& machine, const v1::RenewLeaseRequest& request, const Caller& caller,
             const ReplyPtr& reply, v1::RenewLeaseResponse* response);
+void handle(Machine& machine, const v1::RenewPreparedRequest& request, const Caller& caller,
+            const ReplyPtr& reply, v1::RenewPreparedResponse* response);
 void handle(Machine& machine, const v1::CancelCommandRequest& request, const Caller& caller,
             const ReplyPtr& reply, v1::CancelCommandResponse* response);
 

@@ -81,6 +81,8 @@ Result<MotionValues> profile(const Request& from) {
   return values;
 }
 
+}  // namespace
+
 Result<WaitUntil> wait_until(v1::WaitUntil from) {
   switch (from) {
     case v1::WAIT_UNTIL_UNSPECIFIED:
@@ -91,11 +93,12 @@ Result<WaitUntil> wait_until(v1::WaitUntil from) {
     case v1::WAIT_UNTIL_DONE:
       return WaitUntil::done;
     default:
-      return fail(Reason::invalid_argument,
-                  fmt::format("options.wait_until has the unknown value {}", int{from}),
+      return fail(Reason::invalid_argument, fmt::format("wait_until has the unknown value {}", int{from}),
                   "use ACCEPTED, STARTED or DONE");
   }
 }
+
+namespace {
 
 Result<BufferMode> buffer_mode(v1::BufferMode from) {
   switch (from) {

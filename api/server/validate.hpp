@@ -23,6 +23,9 @@ namespace axisd::server {
 /// naming `field`.
 [[nodiscard]] Result<void> check_request_id(std::string_view id, std::string_view field);
 
+/// UNSPECIFIED is ACCEPTED. Errors: invalid_argument.
+[[nodiscard]] Result<WaitUntil> wait_until(v1::WaitUntil from);
+
 /// How a command is to be submitted.
 struct Submission {
   CommandOptions options;

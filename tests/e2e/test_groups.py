@@ -60,6 +60,58 @@ class Groups(unittest.TestCase):
         shown = self.axisctl("group", "show", move["id"])
         self.assertIn("start skew", shown.stdout)
 
+    def prepare(self, targets):
+        request = group_pb.PrepareMoveRequest(move=group_pb.MoveGroupRequest(
+            targets=[{"axis": axis, **target} for axis, target in targets.items()],
+            options={"request_id": str(uuid.uuid4())}))
+        return self.client.call(self.client.group.PrepareMove, request, timeout=60)
+
+    def renew(self, move):
+        return self.client.call(self.client.group.RenewPrepared, group_pb.RenewPreparedRequest(id=move.id)).move
+
+    def test_a_prepared_move_starts_at_its_moment(self):
+        for targets in ({"feeder": {"position": 50.0}, "pusher": {"position": 50.0}},
+                        {"feeder": {"position": 20.0}, "carousel": {"position": 40.0}}):
+            prepared = self.prepare(targets)
+            found = prepared.move.preparation
+            self.assertEqual(prepared.move.state, pb.COMMAND_STATE_ACCEPTED, prepared.move)
+            lasts = found.expires.ToNanoseconds() - prepared.clock.ToNanoseconds()
+            self.assertTrue(1.5e9 < lasts <= 2e9, prepared)
+            at = prepared.clock.ToNanoseconds() + found.notice.ToNanoseconds() + 300_000_000
+            request = group_pb.StartPreparedRequest(id=prepared.move.id)
+            request.at.FromNanoseconds(at)
+            started = self.client.call(self.client.group.StartPrepared, request).move
+            self.assertEqual(started.preparation.starts_at.ToNanoseconds(), at)
+            self.assertFalse(started.preparation.HasField("first_start"))
+            moved = wait_for(lambda m=started: self.ended(self.renew(m)), "the move ended")
+            self.assertEqual(moved.state, pb.COMMAND_STATE_DONE, moved)
+            late = moved.preparation.first_start.ToNanoseconds() - at
+            self.assertTrue(0 <= late < 70e6, moved)  # at most 50 ms, and the frame itself
+            for axis, target in targets.items():
+                self.assertAlmostEqual(self.client.state(axis).position, target["position"], delta=0.05)
+
+    def test_a_prepared_move_that_is_not_told_to_start_ends_by_itself(self):
+        prepared = self.prepare({"feeder": {"position": 300.0}, "carousel": {"position": 90.0}})
+        ended = wait_for(lambda: self.ended(prepared.move), "the move ended")
+        self.assertEqual(ended.state, pb.COMMAND_STATE_ABORTED, ended)
+        self.assertEqual(ended.cause.reason, error_pb.REASON_EXPIRED)
+        for axis in ("feeder", "carousel"):
+            self.assertAlmostEqual(self.client.state(axis).position, 10.0, delta=0.05)
+
+    def test_a_prepared_move_that_is_not_renewed_is_stopped(self):
+        prepared = self.prepare({"feeder": {"position": 390.0, "velocity": 20.0},
+                                 "pusher": {"position": 140.0, "velocity": 20.0}})
+        request = group_pb.StartPreparedRequest(id=prepared.move.id, wait_until=pb.WAIT_UNTIL_STARTED)
+        request.at.FromNanoseconds(prepared.clock.ToNanoseconds() + prepared.move.preparation.notice.ToNanoseconds()
+                                   + 300_000_000)
+        started = self.client.call(self.client.group.StartPrepared, request).move
+        self.assertEqual(started.state, pb.COMMAND_STATE_ACTIVE, started)
+        ended = wait_for(lambda: self.ended(started), "the move ended")
+        self.assertEqual(ended.state, pb.COMMAND_STATE_ABORTED, ended)
+        self.assertEqual(ended.cause.reason, error_pb.REASON_EXPIRED)
+        for axis in ("feeder", "pusher"):
+            self.client.wait_state(axis, lambda s: s.state == pb.STATE_STANDSTILL, f"{axis} rests")
+
     def test_a_stop_of_the_group_and_of_one_member_stops_all(self):
         for stop in (("group", "stop", "transfer"), ("group", "halt", "--axis", "feeder", "--axis", "pusher"),
                      ("stop", "pusher")):

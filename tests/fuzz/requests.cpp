@@ -66,6 +66,8 @@ void explain(std::span<const std::uint8_t> bytes) {
 
 void move_group(std::span<const std::uint8_t> bytes) {
   (void)server::to_request(parsed<v1::MoveGroupRequest>(bytes));
+  (void)server::to_request(parsed<v1::PrepareMoveRequest>(bytes));
+  (void)server::to_request(parsed<v1::StartPreparedRequest>(bytes), "anna");
 }
 
 void releases(std::span<const std::uint8_t> bytes) {

@@ -95,6 +95,7 @@ class StopCalls:
         groups = group_service_pb2_grpc.GroupServiceStub(main)
         self.GroupHalt = lane.call("GroupHalt", groups.GroupHalt)
         self.GroupStop = lane.call("GroupStop", groups.GroupStop)
+        self.RenewPrepared = lane.call("RenewPrepared", groups.RenewPrepared)
         self.StopAll = lane.call("StopAll", system_service_pb2_grpc.SystemServiceStub(main).StopAll)
         self.RenewLease = lane.call("RenewLease", lease_service_pb2_grpc.LeaseServiceStub(main).RenewLease)
         self.CancelCommand = lane.call("CancelCommand",

@@ -142,6 +142,7 @@ constexpr Entry table[] = {
     {"/axisd.v1.StopService/GroupStop", &take<v1::GroupStopRequest, v1::GroupStopResponse>},
     {"/axisd.v1.StopService/StopAll", &take<v1::StopAllRequest, v1::StopAllResponse>},
     {"/axisd.v1.StopService/RenewLease", &take<v1::RenewLeaseRequest, v1::RenewLeaseResponse>},
+    {"/axisd.v1.StopService/RenewPrepared", &take<v1::RenewPreparedRequest, v1::RenewPreparedResponse>},
     {"/axisd.v1.StopService/CancelCommand", &take<v1::CancelCommandRequest, v1::CancelCommandResponse>},
 };
 

@@ -82,6 +82,72 @@ TEST_F(GroupCalls, MalformedRequestsAreRefusedHere) {
   refused("request_id");
 }
 
+TEST_F(GroupCalls, APreparedMoveIsStartedAndRenewedByItsId) {
+  Call context;
+  v1::PrepareMoveRequest wanted;
+  *wanted.mutable_move() = request_;
+  v1::PrepareMoveResponse prepared;
+  ASSERT_TRUE(groups_->PrepareMove(&context, wanted, &prepared).ok());
+  const auto& found = prepared.move().preparation();
+  EXPECT_EQ(prepared.move().state(), v1::COMMAND_STATE_ACCEPTED);
+  EXPECT_EQ(found.expires().seconds(), 9);
+  EXPECT_EQ(found.notice().nanos(), 80'000'000);
+  EXPECT_EQ(found.predicted_start_skew().nanos(), 4'000'000);
+  EXPECT_EQ(found.first_start().seconds(), 8);
+  EXPECT_FALSE(found.has_starts_at());
+  EXPECT_TRUE(prepared.has_clock());
+
+  Call second;
+  v1::StartPreparedRequest start;
+  start.set_id("g-1");
+  start.mutable_at()->set_seconds(8);
+  start.mutable_at()->set_nanos(500'000'000);
+  start.set_wait_until(v1::WAIT_UNTIL_STARTED);
+  v1::StartPreparedResponse started;
+  ASSERT_TRUE(groups_->StartPrepared(&second, start, &started).ok());
+  EXPECT_EQ(started.move().preparation().starts_at().nanos(), 500'000'000);
+  EXPECT_TRUE(started.has_clock());
+
+  Call third;
+  v1::RenewPreparedRequest renew;
+  renew.set_id("g-1");
+  v1::RenewPreparedResponse renewed;
+  ASSERT_TRUE(groups_->RenewPrepared(&third, renew, &renewed).ok());
+  EXPECT_EQ(renewed.move().id(), "g-1");
+  EXPECT_TRUE(renewed.has_clock());
+  EXPECT_THAT(machine_.groups().log(),
+              ElementsAre("prepare  feeder=0 together false within -1 by " + own_name() + " as r-1 until 0",
+                          "start g-1 at 8500 by " + own_name() + " until 1", "renew g-1 by " + own_name()));
+}
+
+TEST_F(GroupCalls, MalformedPreparationsAreRefusedHere) {
+  v1::PrepareMoveRequest wanted;
+  *wanted.mutable_move() = request_;
+  wanted.mutable_move()->mutable_options()->set_wait_until(v1::WAIT_UNTIL_DONE);
+  v1::PrepareMoveResponse prepared;
+  Call context;
+  EXPECT_THAT(groups_->PrepareMove(&context, wanted, &prepared).error_message(), HasSubstr("wait_until"));
+  const auto refused = [&](const v1::StartPreparedRequest& start) {
+    Call each;
+    v1::StartPreparedResponse started;
+    const auto status = groups_->StartPrepared(&each, start, &started);
+    EXPECT_EQ(detail_of(status).reason(), v1::REASON_INVALID_ARGUMENT);
+    return status.error_message();
+  };
+  v1::StartPreparedRequest start;
+  start.mutable_at()->set_seconds(5);
+  EXPECT_THAT(refused(start), HasSubstr("id"));
+  start.set_id("g-1");
+  start.clear_at();
+  EXPECT_THAT(refused(start), HasSubstr("at is no moment"));
+  start.mutable_at()->set_seconds(-5);
+  EXPECT_THAT(refused(start), HasSubstr("at is no moment"));
+  start.mutable_at()->set_seconds(5);
+  start.set_wait_until(static_cast<v1::WaitUntil>(77));
+  EXPECT_THAT(refused(start), HasSubstr("wait_until"));
+  EXPECT_THAT(machine_.groups().log(), ::testing::IsEmpty());
+}
+
 TEST_F(GroupCalls, ListsAndGets) {
   Call context;
   v1::ListGroupsResponse listed;

@@ -98,6 +98,9 @@ TEST_F(Lane, EveryCallReachesTheMachine) {
   call(&Stub::GroupHalt, halt);
   call(&Stub::StopAll, v1::StopAllRequest());
   call(&Stub::RenewLease, v1::RenewLeaseRequest());
+  v1::RenewPreparedRequest renew;
+  renew.set_id("g-1");
+  EXPECT_EQ(call(&Stub::RenewPrepared, renew).move().id(), "g-1");
   v1::CancelCommandRequest cancel;
   cancel.set_id("c-1");
   call(&Stub::CancelCommand, cancel);

@@ -43,6 +43,7 @@ TEST(Names, OfStops) {
                            "/axisd.v1.AxisService/StopX", "/other/Stop", "/axisd.v1.AxisService/Disable"})
     EXPECT_FALSE(is_stop(path)) << path;
   EXPECT_TRUE(is_never_counted("/axisd.v1.AxisService/Disable"));
+  EXPECT_TRUE(is_never_counted("/axisd.v1.GroupService/RenewPrepared"));
   EXPECT_FALSE(is_never_counted("/axisd.v1.AxisService/MoveAbsolute"));
 }
 
