@@ -170,7 +170,7 @@ void handle(Machine& machine, const v1::RenewPreparedRequest& request, const Cal
   if (const auto valid = check_command_id(request.id()); !valid)
     return refuse(reply, caller.name, "renew", valid.error());
   machine.group_access().renew(
-      request.id(), caller.name,
+      request.id(), caller.name, request.all_told() ? GroupRenewal::all_told : GroupRenewal::waits,
       reply_with_value<GroupMove>(reply, [response, &machine](const GroupMove& move) {
         to_proto(move, *response->mutable_move());
         to_proto(machine.now(), *response->mutable_clock());

@@ -96,12 +96,12 @@ void GroupAccessService::start(GroupStartRequest request, WaitUntil until, Callb
        });
 }
 
-void GroupAccessService::renew(std::string id, std::string client, Callback callback) {
+void GroupAccessService::renew(std::string id, std::string client, GroupRenewal renewal, Callback callback) {
   post(loop_->executor(),
-       [this, id = std::move(id), client = std::move(client), callback = std::move(callback)] {
+       [this, id = std::move(id), client = std::move(client), renewal, callback = std::move(callback)] {
          const auto run = find_own(id, client);
          if (!run) return callback(fail(run.error()));
-         (*run)->renew();
+         (*run)->renew(renewal);
          callback((*run)->value());
        });
 }

@@ -105,6 +105,12 @@ struct GroupStartRequest {
   TimePoint at;        ///< the moment of its first start frame
 };
 
+/// Whoever coordinates a move that was told to start still does.
+enum class GroupRenewal : std::uint8_t {
+  waits,     ///< whether its other machines were told, too, is not known yet
+  all_told,  ///< they were: it may start
+};
+
 /// What became of one axis (or of a name that there is not) of a release.
 struct GroupReleaseResult {
   std::string axis;
@@ -128,14 +134,16 @@ class GroupAccess {
   /// (also for groups), invalid_argument, out_of_range (the arrival error), and those of each axis.
   virtual void move(GroupMoveRequest request, CommandOptions options, WaitUntil until,
                     std::function<void(Result<GroupMove>)> callback) = 0;
-  /// Starts a prepared move at its moment. Calls back as move(). From then on it has to be renewed. A repeat
+  /// Starts a prepared move at its moment, if a renewal says by then that all were told. Calls back as
+  /// move(). From then on it has to be renewed. A repeat
   /// with the same moment attaches. Errors: unknown_command; access_denied (another client's); busy (it is
   /// not prepared yet); expired (the moment has passed, or is too near); out_of_range (it is later than the
   /// preparation lasts); request_id_conflict (another moment); what ended it before it was told.
   virtual void start(GroupStartRequest request, WaitUntil until,
                      std::function<void(Result<GroupMove>)> callback) = 0;
   /// Whoever coordinates a prepared move still does. Errors: unknown_command, access_denied.
-  virtual void renew(std::string id, std::string client, std::function<void(Result<GroupMove>)> callback) = 0;
+  virtual void renew(std::string id, std::string client, GroupRenewal renewal,
+                     std::function<void(Result<GroupMove>)> callback) = 0;
   /// A known group move. Errors: unknown_command.
   virtual void get(std::string id, std::function<void(Result<GroupMove>)> callback) = 0;
   /// Stops what is known, and says what is not.

@@ -9,7 +9,8 @@ namespace axisd {
 ///
 ///   preparing -- begin() --------> starting     it starts at once
 ///   preparing -- prepared() -----> prepared     it starts when told
-///   prepared --- told() ---------> due
+///   prepared --- told() ---------> told
+///   told ------- all_told() -----> due
 ///   due -------- begin() --------> starting
 ///   starting --- all_started() --> following
 ///   any -------- give_up() ------> given_up
@@ -18,14 +19,16 @@ class GroupMachine {
   enum class State : std::uint8_t {
     preparing,  ///< all that could forbid a start is looked at
     prepared,   ///< its members wait to be told; it expires by itself
-    due,        ///< its moment is known, and not near yet
+    told,       ///< its moment is known; whether its other machines know theirs is not
+    due,        ///< all know theirs; its moment is not near yet
     starting,   ///< from the last look on; starts may have been sent
     following,  ///< all members have started
     given_up,   ///< something at one member has ended it for all
   };
 
   void prepared() { go(State::preparing, State::prepared); }
-  void told() { go(State::prepared, State::due); }
+  void told() { go(State::prepared, State::told); }
+  void all_told() { go(State::told, State::due); }
   void begin() {
     state_ == State::preparing ? go(State::preparing, State::starting) : go(State::due, State::starting);
   }
@@ -35,7 +38,7 @@ class GroupMachine {
   [[nodiscard]] State state() const { return state_; }
   [[nodiscard]] bool given_up() const { return state_ == State::given_up; }
   /// It was told to start, and is not given up: whoever told it has to renew it.
-  [[nodiscard]] bool runs() const { return state_ >= State::due && !given_up(); }
+  [[nodiscard]] bool runs() const { return state_ >= State::told && !given_up(); }
 
  private:
   void go(State from, State to) {

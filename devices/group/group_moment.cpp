@@ -22,6 +22,8 @@ constexpr auto hold_reserve = std::chrono::milliseconds(20),
 constexpr Duration longest_sync_approach = std::chrono::milliseconds(20);
 /// Of a start that follows another one.
 constexpr auto longest_later_start = std::chrono::milliseconds(200);
+/// It asks for its turns on the lines so long before the last look: until then others may start.
+constexpr auto turn_reserve = std::chrono::milliseconds(250);
 /// Whoever prepares several machines needs so long to choose a moment, at least.
 constexpr auto least_choice = std::chrono::milliseconds(500);
 
@@ -69,9 +71,18 @@ Task<GroupRun::MaybeFailure> GroupRun::await_moment() {
   while (machine_.state() == GroupMachine::State::prepared) co_await news_.wait();
   if (given_up()) co_return std::nullopt;
   const auto at = *preparation_->starts_at;
+  co_await pause_until(at - preparation_->notice - turn_reserve);
+  if (given_up()) co_return std::nullopt;
   co_await take_turns();
   co_await pause_until(at - preparation_->notice);
   if (given_up()) co_return std::nullopt;
+  if (machine_.state() == GroupMachine::State::told) {
+    // One machine alone starts nothing.
+    give_up({.reason = Reason::expired,
+             .message = "its moment is near, and nobody has said that its other machines were told, too",
+             .remedy = "look at the coordinator; then move again"});
+    co_return std::nullopt;
+  }
   machine_.begin();
   const auto latest = at + latest_start + longest_later_start * (members_.size() - 1);
   for (const auto& member : members_) member->take_up(latest);
@@ -124,13 +135,14 @@ Result<void> GroupRun::start_at(TimePoint at) {
                                  .unit = "s"}});
   preparation_->starts_at = at;
   machine_.told();
-  renew();
+  renew(GroupRenewal::waits);
   news_.notify_all();
   return {};
 }
 
-void GroupRun::renew() {
+void GroupRun::renew(GroupRenewal renewal) {
   if (!machine_.runs() || ended(state())) return;
+  if (renewal == GroupRenewal::all_told) machine_.all_told();
   unrenewed_ = parts_.clock->call_at(parts_.clock->now() + renewal_limit, [this] {
     if (ended(state())) return;
     give_up(Error{.reason = Reason::expired,

@@ -60,9 +60,9 @@ class GroupRun : public std::enable_shared_from_this<GroupRun> {
   /// As GroupAccess::start(), whoever asks.
   Result<void> start_at(TimePoint at);
   /// It goes on for `renewal_limit`, if it was told to start.
-  void renew();
-  /// It is to be renewed every 500 ms: two may be lost.
-  static constexpr Duration renewal_limit = std::chrono::milliseconds(1500);
+  void renew(GroupRenewal renewal);
+  /// Whoever coordinates it renews it several times in between.
+  static constexpr Duration renewal_limit = std::chrono::milliseconds(500);
   /// So long after it was prepared it is given up, unless it has started.
   static constexpr Duration longest_preparation = std::chrono::seconds(2);
   /// By how much the first start may miss its moment, or nothing starts: for so long a node that does not

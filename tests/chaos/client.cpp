@@ -25,7 +25,7 @@ void Client::wait() {
 void Client::coordinate() {
   const auto run = prepared_.lock();
   if (!run) return;
-  run->renew();
+  run->renew(dice_.chance(0.8) ? GroupRenewal::all_told : GroupRenewal::waits);
   if (run->prepared() && dice_.chance(0.7)) (void)run->start_at(plant_->world.now() + dice_.up_to(1500ms));
 }
 

@@ -191,9 +191,11 @@ class CountedGroups final : public GroupAccess {
     ledger_->enter(
         [=, this](const auto& ticket) { inner_->start(request, until, ledger_->answer(ticket, callback)); });
   }
-  void renew(std::string id, std::string client, std::function<void(Result<GroupMove>)> callback) override {
-    ledger_->enter(
-        [=, this](const auto& ticket) { inner_->renew(id, client, ledger_->answer(ticket, callback)); });
+  void renew(std::string id, std::string client, GroupRenewal renewal,
+             std::function<void(Result<GroupMove>)> callback) override {
+    ledger_->enter([=, this](const auto& ticket) {
+      inner_->renew(id, client, renewal, ledger_->answer(ticket, callback));
+    });
   }
   void get(std::string id, std::function<void(Result<GroupMove>)> callback) override {
     ledger_->enter([=, this](const auto& ticket) { inner_->get(id, ledger_->answer(ticket, callback)); });

@@ -67,7 +67,8 @@ class Groups(unittest.TestCase):
         return self.client.call(self.client.group.PrepareMove, request, timeout=60)
 
     def renew(self, move):
-        return self.client.call(self.client.group.RenewPrepared, group_pb.RenewPreparedRequest(id=move.id)).move
+        request = group_pb.RenewPreparedRequest(id=move.id, all_told=True)
+        return self.client.call(self.client.group.RenewPrepared, request).move
 
     def test_a_prepared_move_starts_at_its_moment(self):
         for targets in ({"feeder": {"position": 50.0}, "pusher": {"position": 50.0}},
@@ -101,11 +102,11 @@ class Groups(unittest.TestCase):
     def test_a_prepared_move_that_is_not_renewed_is_stopped(self):
         prepared = self.prepare({"feeder": {"position": 390.0, "velocity": 20.0},
                                  "pusher": {"position": 140.0, "velocity": 20.0}})
-        request = group_pb.StartPreparedRequest(id=prepared.move.id, wait_until=pb.WAIT_UNTIL_STARTED)
+        request = group_pb.StartPreparedRequest(id=prepared.move.id)
         request.at.FromNanoseconds(prepared.clock.ToNanoseconds() + prepared.move.preparation.notice.ToNanoseconds()
                                    + 300_000_000)
         started = self.client.call(self.client.group.StartPrepared, request).move
-        self.assertEqual(started.state, pb.COMMAND_STATE_ACTIVE, started)
+        wait_for(lambda: self.renew(started).state == pb.COMMAND_STATE_ACTIVE, "the move started")
         ended = wait_for(lambda: self.ended(started), "the move ended")
         self.assertEqual(ended.state, pb.COMMAND_STATE_ABORTED, ended)
         self.assertEqual(ended.cause.reason, error_pb.REASON_EXPIRED)

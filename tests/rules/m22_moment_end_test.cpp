@@ -33,7 +33,8 @@ TEST(M22MomentEnd, WhatHappensToAMemberThatWaitsEndsTheMove) {
     const auto run = rig.prepare({{"x", 50}, {"y", 50}, {"z", 50}});
     if (told) rig.tell(run, 1500ms);
     rig.serial(1).raise_alarm(1);
-    ASSERT_TRUE(rig.ends(run, 1200ms));
+    rig.keep(run, 1200ms);
+    ASSERT_TRUE(ended(run->state()));
     EXPECT_EQ(run->value().cause->where.node, 2) << cause_of(run);
     rig.expect_nothing_started(run);
   }
@@ -45,7 +46,7 @@ TEST(M22MomentEnd, ADriveThatRestartedInBetweenStartsNobody) {
     MomentRig rig;
     const auto run = rig.prepare({{"x", 50}, {"y", 50}, {"z", 50}});
     const auto at = rig.tell(run, 600ms);
-    rig.run(at - before - rig.world.now());
+    rig.keep(run, at - before - rig.world.now());
     rig.serial(1).advance(rig.world.now());
     rig.serial(1).set_power(false);
     rig.run(1ms);
@@ -67,7 +68,7 @@ TEST(M22MomentEnd, AStopOfAMemberAtAnyTimeStartsNobodyOrStopsAll) {
       MomentRig rig({.can_axes = 2});
       const auto run = rig.prepare({{"x", 300}, {"y", 200}, {"z", 150}, {"w", 150}});
       const auto at = rig.tell(run, 450ms);
-      rig.run(at + when - rig.world.now());
+      rig.keep(run, at + when - rig.world.now());
       rig.axis(victim).gate()->request_stop();
       rig.run(50us);
       ASSERT_TRUE(rig.machine->submit(victim, StopRequest{}, {}));
@@ -89,6 +90,7 @@ TEST(M22MomentEnd, WithoutRenewalsAllAreStopped) {
   rig.tell(run);
   rig.keep(run, 1200ms);
   EXPECT_EQ(run->state(), CommandState::active);
+  run->renew(GroupRenewal::all_told);
   rig.run(GroupRun::renewal_limit - 1ms);
   EXPECT_EQ(run->state(), CommandState::active);
   rig.run(2ms);
@@ -112,6 +114,88 @@ TEST(M22MomentEnd, WithoutRenewalsBeforeTheMomentNobodyStarts) {
   EXPECT_TRUE(rig.rests(GroupRun::renewal_limit + 1ms));
   EXPECT_EQ(run->state(), CommandState::aborted);
   rig.expect_nothing_started(run);
+}
+
+/// The coordinator is gone after it told this machine, and before it told another one.
+TEST(M22MomentEnd, AMachineThatIsToldAloneStartsNothing) {
+  MomentRig rig({.can_axes = 2});
+  const auto run = rig.prepare({{"x", 50}, {"y", 50}, {"z", 50}, {"w", 50}});
+  rig.tell_alone(run, 600ms);
+  rig.keep(run, 1s, GroupRenewal::waits);
+  EXPECT_EQ(run->state(), CommandState::aborted);
+  EXPECT_EQ(run->value().cause->reason, Reason::expired);
+  EXPECT_THAT(run->value().cause->message, HasSubstr("other machines were told")) << cause_of(run);
+  rig.keep(run, 1s);
+  rig.expect_nothing_started(run);
+}
+
+TEST(M22MomentEnd, ThatAllWereToldCountsFromWhenThisOneWas) {
+  MomentRig rig;
+  const auto run = rig.prepare({{"x", 50}, {"y", 50}});
+  run->renew(GroupRenewal::all_told);
+  rig.tell_alone(run, 600ms);
+  rig.keep(run, 1s, GroupRenewal::waits);
+  EXPECT_EQ(run->state(), CommandState::aborted);
+  rig.expect_nothing_started(run);
+}
+
+/// A move of somebody else's takes over, as it does from any other; a release ends it, too. Once, and nobody
+/// follows.
+TEST(M22MomentEnd, WhoeverCommandsAMemberOtherwiseEndsTheMove) {
+  for (const bool told : {false, true})
+    for (const bool moves : {true, false}) {
+      SCOPED_TRACE(moves);
+      MomentRig rig;
+      const auto run = rig.prepare({{"x", 50}, {"y", 50}, {"z", 50}});
+      if (told) rig.tell(run);
+      rig.keep(run, 100ms);
+      const auto other = moves ? rig.machine->submit("x", MoveAbsoluteRequest{.position = 7}, {.client = "b"})
+                               : rig.machine->submit("x", DisableRequest{}, {.client = "b"});
+      ASSERT_TRUE(other) << to_string(other.error());
+      rig.keep(run, 3s);
+      EXPECT_EQ(run->state(), CommandState::aborted) << cause_of(run);
+      EXPECT_EQ((*other)->value().state, CommandState::done) << describe((*other)->value());
+      EXPECT_EQ(rig.starts("x"), moves ? 1 : 0);
+      EXPECT_EQ(rig.starts("y") + rig.starts("z"), 0);
+      if (moves) EXPECT_NEAR(rig.load_mm("x"), 7, 0.011);
+    }
+}
+
+/// Also where it is back before the moment.
+TEST(M22MomentEnd, ABusThatIsLostStartsNobody) {
+  for (const bool port : {true, false})
+    for (const auto back : {300ms, 900ms}) {
+      SCOPED_TRACE(port ? "the port closes" : "the cable is cut");
+      MomentRig rig;
+      const auto reach = [&](bool reachable) {
+        port ? rig.line->set_open(reachable) : rig.line->network().set_connected(reachable);
+      };
+      const auto run = rig.prepare({{"x", 50}, {"y", 50}, {"z", 50}});
+      rig.tell(run, 600ms);
+      reach(false);
+      rig.keep(run, back);
+      reach(true);
+      rig.keep(run, 3s);
+      // A cable that was cut for as long as nothing had to be read was not missed.
+      if (port || back > 600ms) EXPECT_EQ(rig.all_starts(), 0) << cause_of(run);
+      if (port || back > 600ms) EXPECT_TRUE(ended(run->state())) << cause_of(run);
+      if (port || back > 600ms) EXPECT_NE(run->state(), CommandState::done);
+      for (const auto* axis : {"x", "y", "z"}) EXPECT_LE(rig.starts(axis), 1);
+    }
+}
+
+/// Until shortly before its moment the line is everybody's.
+TEST(M22MomentEnd, WhatWaitsForItsMomentKeepsNobodyFromStarting) {
+  MomentRig rig({.more_serial_axes = 1});
+  const auto run = rig.prepare({{"x", 50}, {"y", 50}});
+  rig.tell(run, 1900ms);
+  rig.keep(run, 500ms);
+  ASSERT_TRUE(rig.machine->submit("a", MoveAbsoluteRequest{.position = 30}, {}));
+  rig.keep(run, 150ms);
+  EXPECT_EQ(rig.starts("a"), 1);
+  rig.keep(run, 4s);
+  EXPECT_EQ(run->state(), CommandState::done) << cause_of(run);
+  for (const auto* axis : {"x", "y", "a"}) EXPECT_EQ(rig.starts(axis), 1);
 }
 
 TEST(M22MomentEnd, RenewalsProlongNoPreparation) {
@@ -180,6 +264,7 @@ TEST(M22MomentEnd, ADaemonThatIsRestartedStartsNothing) {
     ASSERT_TRUE(rig.run_until([&] { return (*run)->prepared(); }, 5s));
     if (before < 600ms) {
       ASSERT_TRUE((*run)->start_at(rig.world.now() + 500ms));
+      (*run)->renew(GroupRenewal::all_told);
       rig.run(500ms - before);
     }
     *run = nullptr;

@@ -26,7 +26,13 @@ struct MomentRig : GroupRig {
     EXPECT_FALSE(ended(run->state())) << (run->value().cause ? to_string(*run->value().cause) : "");
     return run;
   }
+  /// And all others, too.
   TimePoint tell(const GroupRunPtr& run, Duration ahead = 500ms) {
+    const auto at = tell_alone(run, ahead);
+    run->renew(GroupRenewal::all_told);
+    return at;
+  }
+  TimePoint tell_alone(const GroupRunPtr& run, Duration ahead = 500ms) {
     const auto at = world.now() + ahead;
     const auto told = run->start_at(at);
     EXPECT_TRUE(told) << to_string(told.error());
@@ -38,10 +44,10 @@ struct MomentRig : GroupRig {
     return over;
   }
   /// As its coordinator does.
-  void keep(const GroupRunPtr& run, Duration duration) {
+  void keep(const GroupRunPtr& run, Duration duration, GroupRenewal renewal = GroupRenewal::all_told) {
     for (const auto end = world.now() + duration; world.now() < end;) {
-      this->run(std::min<Duration>(500ms, end - world.now()));
-      run->renew();
+      run->renew(renewal);
+      this->run(std::min<Duration>(200ms, end - world.now()));
     }
   }
   [[nodiscard]] int all_starts() {

@@ -24,7 +24,7 @@ TEST(M22Moment, TheFirstStartFrameGoesOutAtTheMoment) {
     EXPECT_TRUE(rig.rests(600ms));
     rig.line->forget_wire();
     const auto at = rig.tell(run, 700ms);
-    rig.run(at - rig.world.now() - 1us);
+    rig.keep(run, at - rig.world.now() - 1us);
     EXPECT_EQ(rig.all_starts(), 0);
     EXPECT_TRUE(rig.start_frames().empty());
     auto truth = rig.watch(200ms);
@@ -108,7 +108,7 @@ TEST(M22Moment, WhatCannotBeInTimeDoesNotStart) {
     MomentRig rig;  // the process is paused over the moment
     const auto run = rig.prepare({{"x", 50}, {"z", 50}});
     const auto at = rig.tell(run);
-    rig.run(at - 1ms - rig.world.now());
+    rig.keep(run, at - 1ms - rig.world.now());
     rig.world.clock().advance_to(at + GroupRun::latest_start + 1ms);
     rig.keep(run, 500ms);
     ASSERT_TRUE(run->value().cause) << "it has started";
@@ -120,7 +120,7 @@ TEST(M22Moment, WhatCannotBeInTimeDoesNotStart) {
     MomentRig rig;  // a drive does not answer the last look
     const auto run = rig.prepare({{"x", 50}, {"y", 50}});
     const auto at = rig.tell(run);
-    rig.run(at - ahead - rig.world.now());
+    rig.keep(run, at - ahead - rig.world.now());
     rig.faults().add({.kind = FaultKind::drop_reply, .node = 1, .count = 40});
     rig.keep(run, 1s);
     for (const auto begin : rig.start_frames()) EXPECT_LE(begin, at + GroupRun::latest_start);
@@ -215,15 +215,19 @@ TEST(M22Moment, ItIsStartedAndRenewedByWhoPreparedIt) {
   const auto at = rig.world.now() + 400ms;
   access.start({.id = prepared->id, .client = "b", .at = at}, WaitUntil::accepted, take);
   EXPECT_EQ(answered().error().reason, Reason::access_denied);
-  access.renew(prepared->id, "b", take);
+  access.renew(prepared->id, "b", GroupRenewal::all_told, take);
   EXPECT_EQ(answered().error().reason, Reason::access_denied);
-  access.renew("t-g99", "a", take);
+  access.renew("t-g99", "a", GroupRenewal::all_told, take);
   EXPECT_EQ(answered().error().reason, Reason::unknown_command);
   access.start({.id = prepared->id, .client = "a", .at = at}, WaitUntil::done, take);
+  for (int i = 0; i < 50 && !answer; ++i) {
+    access.renew(prepared->id, "a", GroupRenewal::all_told, [](const auto&) {});
+    rig.run(100ms);
+  }
   const auto done = answered();
   ASSERT_TRUE(done) << to_string(done.error());
   EXPECT_EQ(done->state, CommandState::done);
-  access.renew(prepared->id, "a", take);
+  access.renew(prepared->id, "a", GroupRenewal::waits, take);
   EXPECT_EQ(answered()->state, CommandState::done);
 }
 

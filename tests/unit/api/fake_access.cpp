@@ -344,8 +344,9 @@ void FakeGroups::start(GroupStartRequest request, WaitUntil until,
   answer<GroupMove>(callback, GroupMove{.id = request.id, .preparation = {{.starts_at = request.at}}});
 }
 
-void FakeGroups::renew(std::string id, std::string client, std::function<void(Result<GroupMove>)> callback) {
-  note(fmt::format("renew {} by {}", id, client));
+void FakeGroups::renew(std::string id, std::string client, GroupRenewal renewal,
+                       std::function<void(Result<GroupMove>)> callback) {
+  note(fmt::format("renew {} by {}{}", id, client, renewal == GroupRenewal::all_told ? ", all told" : ""));
   answer<GroupMove>(callback, GroupMove{.id = id});
 }
 

@@ -157,7 +157,8 @@ class FakeGroups final : public FakeAccess, public GroupAccess {
             std::function<void(Result<GroupMove>)> callback) override;
   void start(GroupStartRequest request, WaitUntil until,
              std::function<void(Result<GroupMove>)> callback) override;
-  void renew(std::string id, std::string client, std::function<void(Result<GroupMove>)> callback) override;
+  void renew(std::string id, std::string client, GroupRenewal renewal,
+             std::function<void(Result<GroupMove>)> callback) override;
   void get(std::string id, std::function<void(Result<GroupMove>)> callback) override;
   void stop(GroupStopRequest request, std::string client, WaitUntil until,
             std::function<void(std::vector<GroupStopResult>)> callback) override;

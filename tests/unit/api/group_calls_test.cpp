@@ -111,13 +111,15 @@ TEST_F(GroupCalls, APreparedMoveIsStartedAndRenewedByItsId) {
   Call third;
   v1::RenewPreparedRequest renew;
   renew.set_id("g-1");
+  renew.set_all_told(true);
   v1::RenewPreparedResponse renewed;
   ASSERT_TRUE(groups_->RenewPrepared(&third, renew, &renewed).ok());
   EXPECT_EQ(renewed.move().id(), "g-1");
   EXPECT_TRUE(renewed.has_clock());
   EXPECT_THAT(machine_.groups().log(),
               ElementsAre("prepare  feeder=0 together false within -1 by " + own_name() + " as r-1 until 0",
-                          "start g-1 at 8500 by " + own_name() + " until 1", "renew g-1 by " + own_name()));
+                          "start g-1 at 8500 by " + own_name() + " until 1",
+                          "renew g-1 by " + own_name() + ", all told"));
 }
 
 TEST_F(GroupCalls, MalformedPreparationsAreRefusedHere) {

@@ -15,8 +15,9 @@ GroupMachine at(State state) {
   }
   if (state == State::starting || state == State::following) machine.begin();
   if (state == State::following) machine.all_started();
-  if (state == State::prepared || state == State::due) machine.prepared();
-  if (state == State::due) machine.told();
+  if (state == State::prepared || state == State::told || state == State::due) machine.prepared();
+  if (state == State::told || state == State::due) machine.told();
+  if (state == State::due) machine.all_told();
   EXPECT_EQ(machine.state(), state);
   return machine;
 }
@@ -35,9 +36,15 @@ TEST(GroupMachine, WhatIsPreparedWaitsToBeTold) {
   EXPECT_EQ(machine.state(), State::prepared) << "it starts nothing untold";
 }
 
-TEST(GroupMachine, WhatIsToldIsDue) {
+TEST(GroupMachine, WhatIsToldIsDueOnceAllWereTold) {
   auto machine = at(State::prepared);
+  machine.all_told();
+  EXPECT_EQ(machine.state(), State::prepared) << "it was not told itself";
   machine.told();
+  EXPECT_EQ(machine.state(), State::told);
+  machine.begin();
+  EXPECT_EQ(machine.state(), State::told) << "alone it starts nothing";
+  machine.all_told();
   EXPECT_EQ(machine.state(), State::due);
   auto early = at(State::preparing);
   early.told();
@@ -61,12 +68,13 @@ TEST(GroupMachine, WhatHasStartedIsFollowed) {
 
 TEST(GroupMachine, AnythingIsGivenUpForGood) {
   for (const auto state :
-       {State::preparing, State::prepared, State::due, State::starting, State::following}) {
+       {State::preparing, State::prepared, State::told, State::due, State::starting, State::following}) {
     auto machine = at(state);
     machine.give_up();
     EXPECT_TRUE(machine.given_up());
     machine.prepared();
     machine.told();
+    machine.all_told();
     machine.begin();
     machine.all_started();
     EXPECT_EQ(machine.state(), State::given_up);
@@ -76,7 +84,8 @@ TEST(GroupMachine, AnythingIsGivenUpForGood) {
 TEST(GroupMachine, ItIsRenewedFromWhenItWasTold) {
   for (const auto state : {State::preparing, State::prepared, State::given_up})
     EXPECT_FALSE(at(state).runs());
-  for (const auto state : {State::due, State::starting, State::following}) EXPECT_TRUE(at(state).runs());
+  for (const auto state : {State::told, State::due, State::starting, State::following})
+    EXPECT_TRUE(at(state).runs());
 }
 
 }  // namespace
