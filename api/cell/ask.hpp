@@ -38,17 +38,22 @@ void ask_bytes(boost::asio::any_io_executor core, const std::shared_ptr<grpc::Ch
                const Question& question, grpc::ByteBuffer request,
                std::function<void(const grpc::Status&, const grpc::ByteBuffer&)> done);
 
-/// The same with messages. What cannot be read is an error.
+/// For an answer as bytes: `done` gets the message. What cannot be read is an error.
+template <class Response, class Done>
+auto reading(Done done) {
+  return [done = std::move(done)](const grpc::Status& status, const grpc::ByteBuffer& bytes) mutable {
+    Response response;
+    if (status.ok() && !from_buffer(bytes, response))
+      return done(grpc::Status(grpc::StatusCode::INTERNAL, "the answer cannot be read"), response);
+    done(status, response);
+  };
+}
+
+/// The same with messages.
 template <class Response, class Done>
 void ask(boost::asio::any_io_executor core, const std::shared_ptr<grpc::Channel>& channel,
          const Question& question, const google::protobuf::MessageLite& request, Done done) {
-  ask_bytes(std::move(core), channel, question, to_buffer(request),
-            [done = std::move(done)](const grpc::Status& status, const grpc::ByteBuffer& bytes) mutable {
-              Response response;
-              if (status.ok() && !from_buffer(bytes, response))
-                return done(grpc::Status(grpc::StatusCode::INTERNAL, "the answer cannot be read"), response);
-              done(status, response);
-            });
+  ask_bytes(std::move(core), channel, question, to_buffer(request), reading<Response>(std::move(done)));
 }
 
 /// A call in both directions that stays open. Thread: core.

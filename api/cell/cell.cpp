@@ -66,6 +66,7 @@ Cell::Cell(boost::asio::io_context& io, Clock& clock, const Settings& settings, 
                  .disk = disk_,
                  .tell = [this](v1::CellEvent event) { tell(std::move(event)); },
                  .instance_id = identity_.instance_id}),
+      group_moves_(io.get_executor(), clock, routes),
       registry_since_(clock.now()) {
   remember();
 }
@@ -108,6 +109,7 @@ void Cell::end(std::function<void()> done) {
                               "axisd-cell is shutting down", "connect again, to any entrance of the cell");
   watchers_.finish(over);
   event_readers_.finish(over);
+  group_moves_.end(over);
   own_timer_.reset();
   machines_.end();
   stop_all_.end();

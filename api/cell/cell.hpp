@@ -14,6 +14,7 @@
 #include "api/cell/core_stream.hpp"
 #include "api/cell/disk.hpp"
 #include "api/cell/event_log.hpp"
+#include "api/cell/group_moves.hpp"
 #include "api/cell/machines.hpp"
 #include "api/cell/metrics.hpp"
 #include "api/cell/open_calls.hpp"
@@ -60,6 +61,9 @@ class Cell {
   /// Whether the axisd beside this entrance says that the caller is a maintainer.
   void release_stop_all(const Caller& caller,
                         std::function<void(const grpc::Status&, const v1::ReleaseStopAllResponse&)> done);
+  void move_group(const Caller& caller, const v1::MoveGroupRequest& request, GroupMoves::Answer answer) {
+    group_moves_.move(caller, request, std::move(answer));
+  }
   [[nodiscard]] v1::ExchangeStopAllResponse exchange(const v1::ExchangeStopAllRequest& request) {
     return stop_all_.exchange(request);
   }
@@ -93,6 +97,7 @@ class Cell {
   Machines machines_;
   std::unique_ptr<RegistryKeeper> registry_;  ///< nullptr: without etcd
   StopAllKeeper stop_all_;
+  GroupMoves group_moves_;
   CoreStreams<v1::WatchMachinesResponse> watchers_;
   CoreStreams<v1::WatchEventsResponse> event_readers_;
   /// Counts changes of machines; of each machine, and of each that is forgotten, the last one.

@@ -127,6 +127,15 @@ grpc::ServerUnaryReactor* CellServiceImpl::ReleaseStopAll(grpc::CallbackServerCo
              const Answer<v1::ReleaseStopAllResponse>& answer) { cell_.release_stop_all(caller, answer); });
 }
 
+grpc::ServerUnaryReactor* CellServiceImpl::MoveGroup(grpc::CallbackServerContext* context,
+                                                     const v1::MoveGroupRequest* request,
+                                                     v1::MoveGroupResponse* response) {
+  return serve<v1::MoveGroupRequest, v1::MoveGroupResponse>(
+      context, request, response,
+      [this](const Caller& caller, const v1::MoveGroupRequest& asked,
+             const Answer<v1::MoveGroupResponse>& answer) { cell_.move_group(caller, asked, answer); });
+}
+
 grpc::ServerWriteReactor<v1::WatchEventsResponse>* CellServiceImpl::WatchEvents(
     grpc::CallbackServerContext* context, const v1::WatchEventsRequest* request) {
   return stream<v1::WatchEventsResponse>(

@@ -39,6 +39,9 @@ class CellServiceImpl final : public v1::CellService::CallbackService {
   grpc::ServerUnaryReactor* ReleaseStopAll(grpc::CallbackServerContext* context,
                                            const v1::ReleaseStopAllRequest* request,
                                            v1::ReleaseStopAllResponse* response) override;
+  grpc::ServerUnaryReactor* MoveGroup(grpc::CallbackServerContext* context,
+                                      const v1::MoveGroupRequest* request,
+                                      v1::MoveGroupResponse* response) override;
   grpc::ServerWriteReactor<v1::WatchEventsResponse>* WatchEvents(
       grpc::CallbackServerContext* context, const v1::WatchEventsRequest* request) override;
   grpc::ServerUnaryReactor* ExchangeStopAll(grpc::CallbackServerContext* context,

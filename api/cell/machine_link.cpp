@@ -13,13 +13,13 @@ namespace {
 /// A GetInfo is answered from what an axisd has in memory.
 constexpr Duration who_patience = std::chrono::milliseconds(1500);
 
-/// Another address may take what this one does not. What an axisd itself says has details.
+}  // namespace
+
 bool is_for_another(const grpc::Status& status) {
   return status.error_code() == grpc::StatusCode::UNIMPLEMENTED ||
-         (status.error_details().empty() && status.error_code() != grpc::StatusCode::DEADLINE_EXCEEDED);
+         (!status.ok() && status.error_details().empty() &&
+          status.error_code() != grpc::StatusCode::DEADLINE_EXCEEDED);
 }
-
-}  // namespace
 
 MachineLink::MachineLink(boost::asio::any_io_executor core, std::shared_ptr<grpc::ChannelCredentials> trusted,
                          Addresses addresses)
@@ -102,21 +102,9 @@ void MachineLink::warm_lane() {
 }
 
 void MachineLink::stop_all(const Metadata& metadata, Duration timeout, Stopped done) {
-  const auto until = monotonic_now() + timeout;
-  const auto at_main = [core = core_, main = main_, metadata, done](Duration left) {
-    ask<axisd::v1::StopAllResponse>(
-        core, main, {.path = "/axisd.v1.SystemService/StopAll", .timeout = left, .metadata = metadata},
-        axisd::v1::StopAllRequest(), done);
-  };
-  if (!way().lane_is_ready()) return at_main(timeout);
-  ask<axisd::v1::StopAllResponse>(
-      core_, lane_, {.path = "/axisd.v1.StopService/StopAll", .timeout = timeout, .metadata = metadata},
-      axisd::v1::StopAllRequest(),
-      [at_main, until, done](const grpc::Status& status, const axisd::v1::StopAllResponse& response) {
-        const auto left = until - monotonic_now();
-        if (status.ok() || !is_for_another(status) || left <= Duration::zero()) return done(status, response);
-        at_main(left);
-      });
+  ask_lane_first<axisd::v1::StopAllResponse>(core_, way(), "SystemService",
+                                             {.path = "StopAll", .timeout = timeout, .metadata = metadata},
+                                             axisd::v1::StopAllRequest(), std::move(done));
 }
 
 void MachineLink::release_stop_all(const Metadata& metadata, Duration timeout,

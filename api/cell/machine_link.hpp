@@ -1,6 +1,7 @@
 // The warm connections to one machine: its axisd, its axisd's stop lane, its entrance.
 #pragma once
 
+#include <fmt/format.h>
 #include <grpcpp/channel.h>
 #include <grpcpp/generic/generic_stub.h>
 #include <grpcpp/security/credentials.h>
@@ -10,6 +11,7 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <string_view>
 
 #include "api/cell/ask.hpp"
 #include "api/cell/peer_machine.hpp"
@@ -30,6 +32,32 @@ struct Way {
   std::shared_ptr<grpc::Channel> main, lane;
   [[nodiscard]] bool lane_is_ready() const { return lane && lane->GetState(true) == GRPC_CHANNEL_READY; }
 };
+
+/// Another address may take what this one does not. What an axisd itself says has details.
+[[nodiscard]] bool is_for_another(const grpc::Status& status);
+
+/// Asks a machine's stop lane, and where that does not take it, its main address. `question.path`: the name
+/// of the call alone, of StopService there and of `service` here. Thread: core.
+template <class Response, class Done>
+void ask_lane_first(const boost::asio::any_io_executor& core, const Way& way, const std::string& service,
+                    const Question& question, const google::protobuf::MessageLite& request, Done done) {
+  const auto until = monotonic_now() + question.timeout;
+  const auto of = [question](std::string_view of_service, Duration left) {
+    return Question{.path = fmt::format("/axisd.v1.{}/{}", of_service, question.path),
+                    .timeout = left,
+                    .metadata = question.metadata};
+  };
+  if (!way.lane_is_ready())
+    return ask<Response>(core, way.main, of(service, question.timeout), request, done);
+  ask_bytes(core, way.lane, of("StopService", question.timeout), to_buffer(request),
+            [core, main = way.main, of, service, until, done, bytes = to_buffer(request)](
+                const grpc::Status& status, const grpc::ByteBuffer& answer) {
+              const auto left = until - monotonic_now();
+              if (is_for_another(status) && left > Duration::zero())
+                return ask_bytes(core, main, of(service, left), bytes, reading<Response>(done));
+              reading<Response>(done)(status, answer);
+            });
+}
 
 /// Thread: core.
 class MachineLink {

@@ -1,0 +1,141 @@
+// A move of axes of several machines, from one moment on: what is to be asked of whom. Pure.
+#pragma once
+
+#include <grpcpp/support/status.h>
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "api/cell/clock_samples.hpp"
+#include "axisd/cell/v1/cell_service.pb.h"
+#include "buses/clock.hpp"
+
+namespace axisd::cell {
+
+/// Each machine prepares its part, tells its clock, is told a moment of that clock, and is renewed from then
+/// on. It starts only once a renewal has said that all were told, and stops by itself where renewals end: so
+/// where this process is gone, none starts, or all stop.
+///
+///   preparing --- all are prepared ------------------> measuring
+///   preparing --- all have ended --------------------> over       a repeated request
+///   preparing --- one was told before ---------------> attached   by another entrance, for the same request
+///   measuring --- all clocks are known well enough --> telling
+///   telling ----- all have taken their moment -------> running
+///   telling ----- one has another moment ------------> attached
+///   running ----- all are done ----------------------> over
+///   attached ---- all have ended, or cannot be asked > over
+///   preparing, measuring, telling, running
+///            ---- one refuses, fails, ends or is lost, or it is too late --> giving_up
+///   giving_up --- all have ended, or no longer answer --------------------> over
+///
+/// Only `giving_up` stops anybody, and nobody is stopped whom another entrance has told. Thread: core.
+class GroupMoveMachine {
+ public:
+  enum class State : std::uint8_t {
+    preparing,  ///< each is asked to prepare its part
+    measuring,  ///< each is asked for its clock
+    telling,    ///< each is told its moment
+    running,    ///< all were told, and are renewed until they are done
+    attached,   ///< another entrance does this: it is only looked at
+    giving_up,  ///< all are stopped
+    over,
+  };
+
+  /// One thing that is to be asked. Its answer comes by the function of the same name.
+  struct Errand {
+    enum class Kind : std::uint8_t { prepare, measure, tell, renew, cancel, look } kind;
+    std::size_t machine;  ///< index
+    Duration at{};        ///< of tell: by its clock
+    bool all_told = false;
+  };
+  using Errands = std::vector<Errand>;
+
+  /// What a machine has answered.
+  struct Answer {
+    TimePoint sent, received;
+    grpc::Status status{};
+    axisd::v1::GroupMove move{};  ///< where the status is OK, as the clock
+    Duration clock{};
+  };
+
+  static constexpr int round_trips = 16;
+  /// A machine stops 500 ms after the last one that reached it.
+  static constexpr Duration renewal_period = std::chrono::milliseconds(150);
+  /// How often those are looked at that are not renewed.
+  static constexpr Duration look_period = std::chrono::milliseconds(100);
+  /// Between the choice of the moment and when machines begin to look at their members for the last time.
+  static constexpr Duration lead = std::chrono::milliseconds(400);
+  /// So long it is looked at what became of machines that were stopped.
+  static constexpr Duration longest_end = std::chrono::seconds(5);
+
+  /// `clock_tolerance`: a clock has to be known better than this.
+  GroupMoveMachine(std::vector<std::string> machines, Duration clock_tolerance);
+
+  [[nodiscard]] Errands begin();
+  [[nodiscard]] Errands prepared(std::size_t machine, const Answer& answer);
+  [[nodiscard]] Errands measured(std::size_t machine, const Answer& answer);
+  [[nodiscard]] Errands told(std::size_t machine, const Answer& answer);
+  [[nodiscard]] Errands renewed(std::size_t machine, const Answer& answer);
+  [[nodiscard]] Errands cancelled(std::size_t machine, const grpc::Status& status);
+  [[nodiscard]] Errands looked(std::size_t machine, const Answer& answer);
+  /// To be called every 50 ms.
+  [[nodiscard]] Errands tick(TimePoint now);
+
+  [[nodiscard]] State state() const { return state_; }
+  /// How it stands, as far as is known.
+  [[nodiscard]] v1::CellGroupMove value() const;
+  /// It has come as far, or is over.
+  [[nodiscard]] bool reached(axisd::v1::WaitUntil until) const;
+  /// Of the move at this machine; empty: it is not prepared.
+  [[nodiscard]] const std::string& id_at(std::size_t machine) const { return parts_[machine].move.id(); }
+  /// Its commands that have not ended, as far as is known.
+  [[nodiscard]] std::vector<std::string> commands_at(std::size_t machine) const;
+  /// Why nothing of it was started, nor will be; OK: something may have been.
+  [[nodiscard]] const grpc::Status& refusal() const { return refusal_; }
+
+ private:
+  struct Part {
+    enum class Stage : std::uint8_t {
+      asked,     ///< whether it is prepared is not known yet
+      prepared,  ///< it waits for its moment
+      told,      ///< it has its moment
+      foreign,   ///< another entrance has told it
+      ended,     ///< nothing of it moves, or will, as far as is known
+    };
+    std::string machine;
+    Stage stage = Stage::asked;
+    axisd::v1::GroupMove move{};
+    std::optional<axisd::v1::ErrorDetail> error{};
+    ClockSamples clock{};
+    TimePoint next{};  ///< when it is to be asked again
+    bool stopping = false;
+  };
+
+  [[nodiscard]] bool all(Part::Stage stage) const;
+  [[nodiscard]] bool any(Part::Stage stage) const;
+  /// What a machine says of its part.
+  void take(Part& part, const axisd::v1::GroupMove& move);
+  /// Of an answer in `state`: its move, or the end of all. False: it ends all.
+  [[nodiscard]] bool goes_on(std::size_t machine, const Answer& answer, Errands& errands);
+  [[nodiscard]] Errands judge_prepared(TimePoint now);
+  [[nodiscard]] Errands choose_moment(TimePoint now);
+  [[nodiscard]] Errands give_up(axisd::v1::ErrorDetail cause, grpc::StatusCode code, TimePoint now);
+  [[nodiscard]] Errands fail(std::size_t machine, const grpc::Status& status, TimePoint now);
+  void stop_part(std::size_t machine, Errands& errands);
+  void end_if_over();
+  void attach();
+  [[nodiscard]] axisd::v1::CommandState result() const;
+  void fill_skew(v1::CellGroupMove& to) const;
+
+  State state_ = State::preparing;
+  const Duration clock_tolerance_;
+  std::vector<Part> parts_;
+  std::optional<axisd::v1::ErrorDetail> cause_;
+  grpc::Status refusal_;
+  TimePoint latest_told_{};  ///< all have to be told by then
+  TimePoint end_by_ = TimePoint::max();
+};
+
+}  // namespace axisd::cell

@@ -1,0 +1,72 @@
+// GroupMoveMachine, with machines to ask.
+#pragma once
+
+#include <grpcpp/support/status.h>
+
+#include <boost/asio/any_io_executor.hpp>
+#include <cstdint>
+#include <functional>
+#include <list>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "api/cell/callers.hpp"
+#include "api/cell/group_move_machine.hpp"
+#include "api/cell/routes.hpp"
+#include "axisd/cell/v1/cell_service.pb.h"
+#include "buses/clock.hpp"
+
+namespace axisd::cell {
+
+/// The moves of several machines that this entrance coordinates, and some that have ended. Thread: core.
+class GroupMoves {
+ public:
+  /// `routes` and `clock` outlive this.
+  GroupMoves(boost::asio::any_io_executor core, Clock& clock, const RouteTable& routes)
+      : core_(std::move(core)), clock_(clock), routes_(routes) {}
+
+  using Answer = std::function<void(const grpc::Status&, const v1::MoveGroupResponse&)>;
+  /// Begins a move, or attaches to the one of that request_id. `answer`: once it has come as far as the
+  /// request says, or was refused.
+  void move(const Caller& caller, const v1::MoveGroupRequest& request, Answer answer);
+  /// Nobody is renewed any more, so that all stop by themselves; whoever waits is told.
+  void end(const grpc::Status& why);
+  /// That have not ended.
+  [[nodiscard]] int open() const;
+
+  /// Of one client, and of all, that have not ended.
+  static constexpr int most_of_one = 8, most = 64;
+  /// So many that have ended are remembered, for those who ask again.
+  static constexpr std::size_t most_ended = 256;
+  static constexpr std::size_t most_machines = 128;
+
+ private:
+  struct Run;
+  using RunPtr = std::shared_ptr<Run>;
+  [[nodiscard]] RunPtr find(const Caller& caller, const std::string& request_id) const;
+  [[nodiscard]] grpc::Status check(const Caller& caller, const v1::MoveGroupRequest& request) const;
+  /// The connections to its machines; or why one cannot be asked.
+  [[nodiscard]] grpc::Status connect(Run& run) const;
+  void perform(const RunPtr& run, const GroupMoveMachine::Errands& errands);
+  void perform(const RunPtr& run, const GroupMoveMachine::Errand& errand);
+  void prepare(const RunPtr& run, std::size_t machine);
+  void tell(const RunPtr& run, std::size_t machine, Duration at);
+  void renew(const RunPtr& run, const GroupMoveMachine::Errand& errand);
+  void cancel(const RunPtr& run, std::size_t machine);
+  void look(const RunPtr& run, std::size_t machine);
+  using Event = GroupMoveMachine::Errands (GroupMoveMachine::*)(std::size_t, const GroupMoveMachine::Answer&);
+  /// What is to be done with an answer: `event` of the run's machine.
+  template <class Response>
+  auto taker(const RunPtr& run, std::size_t machine, Event event);
+  void tick(const RunPtr& run);
+  void settle(const RunPtr& run);
+  void forget_oldest();
+
+  boost::asio::any_io_executor core_;
+  Clock& clock_;
+  const RouteTable& routes_;
+  std::list<RunPtr> runs_;  ///< oldest first
+};
+
+}  // namespace axisd::cell
