@@ -7,6 +7,7 @@
 
 #include "api/axisctl/invocation.hpp"
 #include "axisd/v1/axis_service.pb.h"
+#include "axisd/v1/group_service.pb.h"
 #include "axisd/v1/system_service.pb.h"
 
 namespace axisd::axisctl {
@@ -29,5 +30,10 @@ void watch_cell(Invocation& invocation, const std::vector<std::string>& words,
 void stop_cell(Invocation& invocation, bool wait);
 /// Its release, and that of each machine's own.
 void release_cell(Invocation& invocation);
+/// Its targets are of several machines of a cell.
+[[nodiscard]] bool names_several_machines(const Invocation& invocation, const v1::MoveGroupRequest& move);
+/// Moves them from one moment on, told by the entrance. `clock_tolerance`: nullptr: the usual one.
+void move_cell_group(Invocation& invocation, const v1::MoveGroupRequest& move,
+                     const google::protobuf::Duration* clock_tolerance);
 
 }  // namespace axisd::axisctl

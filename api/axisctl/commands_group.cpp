@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 
+#include "api/axisctl/cell_commands.hpp"
 #include "api/axisctl/duration.hpp"
 #include "api/axisctl/format.hpp"
 #include "api/axisctl/hold_view.hpp"
@@ -26,11 +27,12 @@ constexpr const char* examples = R"(
 Examples:
   axisctl group move transfer feeder=100mm carousel=90deg --together --wait
   axisctl group move feeder=+5mm@20mm/s pusher=-5mm --relative      axes of this move alone
+  axisctl --cell hall group move press-1/feeder=100mm press-2/arm=90deg      from one moment on
   axisctl group stop transfer)";
 
 struct Arguments : MotionArguments {
   std::vector<std::string> words;  ///< of move: the group, if any, then targets
-  std::string group, max_arrival_error;
+  std::string group, max_arrival_error, clock_tolerance;
   bool relative = false, together = false, keep = false;
 };
 
@@ -123,7 +125,12 @@ void print_move(Invocation& invocation, const v1::GroupMove& move) {
 void move(Invocation& invocation, const Arguments& arguments) {
   auto request = request_of(invocation, arguments);
   request.mutable_options()->set_wait_until(arguments.wait ? v1::WAIT_UNTIL_DONE : v1::WAIT_UNTIL_ACCEPTED);
+  google::protobuf::Duration tolerance;
+  if (!arguments.clock_tolerance.empty())
+    set(tolerance, parse_duration(arguments.clock_tolerance, "--clock-tolerance"));
   try {
+    if (names_several_machines(invocation, request))
+      return move_cell_group(invocation, request, arguments.clock_tolerance.empty() ? nullptr : &tolerance);
     const auto response =
         arguments.wait
             ? invocation.client().call_within(std::chrono::nanoseconds(0), &Stub::MoveGroup, request, "")
@@ -233,6 +240,11 @@ void add_move(CLI::App& group, Invocation& invocation) {
   command
       ->add_option("--max-arrival-error", arguments->max_arrival_error,
                    "Refuse where arrivals would lie further apart: 10ms (default: the group's)")
+      ->type_name("TIME");
+  command
+      ->add_option(
+          "--clock-tolerance", arguments->clock_tolerance,
+          "Over several machines of a cell: refuse where a clock is known less well: 0.5ms (default: 1ms)")
       ->type_name("TIME");
   add_ramps(*command, *arguments);
   add_options(*command, *arguments);

@@ -9,7 +9,7 @@ import grpc.aio
 import fake_server  # makes axisd importable
 from fake_axis import refuse
 from axisd.cell.v1 import cell_service_pb2 as pb, cell_service_pb2_grpc as rpc
-from axisd.v1 import error_pb2, system_service_pb2 as system_pb
+from axisd.v1 import error_pb2, system_service_pb2 as system_pb, types_pb2
 
 OWN = "press-1"
 
@@ -60,7 +60,7 @@ class FakeCell(rpc.CellServiceServicer):
     """`machines`: FakeMachine by name. `silent`: names of those that do not answer; `gone`: of these, those that are not
     registered either. `forwarded`: (machine, method).
     `holding`: events by (machine, method) of calls that are never answered, set when one has come. `readers`:
-    of events of the cell, so far."""
+    of events of the cell, so far. `moves`: requests of MoveGroup."""
 
     def __init__(self, names):
         self.machines = {name: fake_server.FakeMachine() for name in names}
@@ -68,7 +68,7 @@ class FakeCell(rpc.CellServiceServicer):
         self.changed = asyncio.Condition()
         self.changes, self.events, self.latches = [], [], []
         self.not_shared = None
-        self.holding, self.readers = {}, 0
+        self.holding, self.readers, self.moves = {}, 0, []
 
     async def serve(self):
         """Returns the servers, the entrance's first, and its port."""
@@ -163,6 +163,31 @@ class FakeCell(rpc.CellServiceServicer):
             machine.inhibited = False
             release.outcome = pb.MACHINE_OUTCOME_DONE
         return response
+
+    async def MoveGroup(self, request, context):
+        """Is done at once, without anything having moved; `sticky` fails."""
+        self.moves.append(request)
+        move = pb.CellGroupMove(state=types_pb2.COMMAND_STATE_DONE)
+        for number, part in enumerate(request.machines):
+            if part.machine in self.silent:
+                await refuse(context, grpc.StatusCode.UNAVAILABLE, silence(part.machine))
+            answer = move.machines.add(machine=part.machine)
+            answer.move.id = f"g-{number}"
+            answer.clock_error.FromNanoseconds(50_000)
+            answer.started_after.FromNanoseconds(number * 2_000_000)
+            for target in part.targets:
+                state = types_pb2.COMMAND_STATE_ERROR if target.axis == "sticky" else types_pb2.COMMAND_STATE_DONE
+                member = answer.move.members.add(command=types_pb2.Command(id=f"c-{number}", axis=target.axis, state=state))
+                member.started_after.FromNanoseconds(1_000_000)
+                if target.axis == "sticky":
+                    cause = error_pb2.ErrorDetail(reason=error_pb2.REASON_NOT_CONFIRMED, message="sticky: it did not arrive")
+                    member.command.cause.CopyFrom(cause)
+                    move.state = state
+                    move.cause.CopyFrom(cause)
+                    move.cause.message = f"{part.machine}: {cause.message}"
+        move.start_skew.FromNanoseconds(2_000_000)
+        move.start_skew_error.FromNanoseconds(100_000)
+        return pb.MoveGroupResponse(move=move)
 
     async def WatchEvents(self, request, context):
         cursor = request.after_sequence if request.HasField("after_sequence") else len(self.events)

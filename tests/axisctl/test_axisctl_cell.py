@@ -94,7 +94,7 @@ class Names(CellTest):
         self.assertEqual(self.fails(2, "enable", "press-1/feeder", "turntable"),
                          "'turntable' names no machine of the cell; write MACHINE/turntable")
         self.assertIn("name it with --machine", self.fails(2, "buses"))
-        self.assertIn("are two machines", self.fails(2, "group", "move", "press-1/feeder=1", "press-2/feeder=1"))
+        self.assertIn("are two machines", self.fails(2, "group", "halt", "--axis", "press-1/feeder", "--axis", "press-2/feeder"))
         self.assertIn("no machine's name", self.fails(2, "stop", "Press 2/feeder"))
         self.assertEqual([method for _, method in self.cell.forwarded if method not in ("GetAxis",)], [])
 
@@ -162,6 +162,41 @@ class Names(CellTest):
         self.assertIn("press-2/line-a", words("trace", "press-2/"))
         self.assertIn("feeder", words("--machine", "press-2", "move", ""))
         self.assertIn("current=", [word.split("\t")[0] for word in words("drive", "write", "press-2/feeder", "cur")])
+
+
+
+class Groups(CellTest):
+    def test_axes_of_several_machines_move_from_one_moment_on(self):
+        shown = self.ok("group", "move", "press-1/feeder=10mm", "press-2/feeder=20mm@5mm/s", "press-1/turntable=90deg",
+                        "--clock-tolerance", "0.5ms", "--request-id", "r1", "--lease", "press-2/77", "--wait")
+        self.assertRegex(shown, r"(?s)\Adone\n.*press-1/feeder .*Done.*press-2/feeder .*Done.*\+3 ms")
+        self.assertIn("start skew 2 ms, off by 0.1 ms at most", shown)
+        (request,) = self.cell.moves
+        self.assertEqual([(part.machine, [target.axis for target in part.targets], part.lease_token)
+                          for part in request.machines],
+                         [("press-1", ["feeder", "turntable"], 0), ("press-2", ["feeder"], 77)])
+        self.assertEqual((request.machines[1].targets[0].position, request.machines[1].targets[0].velocity), (20, 5))
+        self.assertEqual((request.options.request_id, request.options.lease_token, request.clock_tolerance.nanos),
+                         ("r1", 0, 500_000))
+        self.assertEqual(self.forwarded("MoveGroup"), [])
+
+    def test_those_of_one_machine_move_there(self):
+        self.ok("group", "move", "press-2/feeder=10mm", "press-2/turntable=20deg", "--wait")
+        self.assertEqual((self.forwarded("MoveGroup"), self.cell.moves), (["press-2"], []))
+
+    def test_what_ended_otherwise_is_told_with_its_machine(self):
+        done = self.run_axisctl("group", "move", "press-1/feeder=10mm", "press-2/sticky=20mm", "--wait")
+        self.assertEqual(done.returncode, 1, done.stderr)
+        self.assertIn("error: press-2: sticky: it did not arrive", done.stdout)
+        shown = json.loads(self.run_axisctl("--json", "group", "move", "press-1/feeder=10mm", "press-2/sticky=20mm").stdout)
+        self.assertEqual(shown["machines"][1]["move"]["members"][0]["command"]["axis"], "press-2/sticky")
+
+    def test_what_is_not_for_several_machines_is_refused(self):
+        two = ("press-1/feeder=10mm", "press-2/feeder=20mm")
+        self.assertIn("--together", self.fails(2, "group", "move", *two, "--together"))
+        self.assertIn("names no machine", self.fails(2, "group", "move", two[0], "feeder=20mm"))
+        self.assertIn("whose lease", self.fails(2, "group", "move", *two, "--lease", "77"))
+        self.assertEqual(self.cell.moves, [])
 
 
 class Across(CellTest):
