@@ -115,6 +115,35 @@ class Axes(CellTest):
             self.assertEqual(axisd.connect_cell().server, "press-7:7445")
 
 
+
+class Groups(CellTest):
+    async def test_axes_of_several_machines_move_from_one_moment_on(self):
+        async with self.cell.lease("press-1/feeder", "press-2/feeder") as lease:
+            tokens = lease.tokens
+            move = await self.cell.move({"press-1/feeder": 10, "press-2/feeder": 20, "press-3/feeder": 30},
+                                        velocity={"press-2/feeder": 5}, clock_tolerance=0.002, lease=lease)
+        self.assertEqual((move.state, move.start_skew, move.start_skew_error), (axisd.CommandState.DONE, 0.002, 0.0001))
+        self.assertEqual(move.machines["press-2"].started_after, 0.002)
+        self.assertEqual(move.machines["press-2"].move.members["feeder"].command.state, axisd.CommandState.DONE)
+        (request,) = self.fake.moves
+        self.assertEqual([(part.machine, part.lease_token) for part in request.machines],
+                         [("press-1", tokens["press-1"]), ("press-2", tokens["press-2"]), ("press-3", 0)])
+        self.assertEqual(request.machines[1].targets[0].velocity, 5)
+        self.assertEqual(request.clock_tolerance.nanos, 2_000_000)
+
+    async def test_what_failed_names_its_machine(self):
+        with self.assertRaises(axisd.MotionError) as raised:
+            await self.cell.move({"press-1/feeder": 10, "press-2/sticky": 20})
+        self.assertEqual((raised.exception.machine, raised.exception.command.axis), ("press-2", "sticky"))
+        self.assertIn("press-2/sticky", str(raised.exception))
+        self.fake.silent.add("press-3")
+        with self.assertRaises(axisd.UnreachableError) as lost:
+            await self.cell.move({"press-1/feeder": 10, "press-3/feeder": 20})
+        self.assertTrue(lost.exception.nothing_sent)
+        with self.assertRaises(axisd.ArgumentError):
+            await self.cell.move({"feeder": 10})
+
+
 class StopAll(CellTest):
     async def test_every_machine_and_its_release(self):
         stopped = await self.cell.stop_all("somebody is inside")

@@ -12,6 +12,7 @@
 from .audit import AuditRecord
 from .axis import Axis, Jog
 from .budget import AxisBudget, BusBudget, StopBudget
+from .cell_group import CellMove, MachineMove
 from .cell_lease import CellLease
 from .cell_types import (CellEvent, CellInfo, CellMachine, CellReleased, CellStopped, MachineOutcome, MachineRelease, MachineState,
                          MachineStop, Registry, StopAllLatch)
@@ -36,12 +37,12 @@ from .types import (AxisState, Bus, BusKind, Command, CommandState, ErrorDetail,
 
 __all__ = [
     "Alarm", "AllStopped", "ArgumentError", "AuditRecord", "Axis", "AxisBudget", "AxisFault", "AxisState", "AxisdError", "Bus", "BusBudget", "BusKind", "BusStatistics",
-    "Cell", "CellEvent", "CellInfo", "CellLease", "CellMachine", "CellReleased", "CellStopped",
+    "Cell", "CellEvent", "CellInfo", "CellLease", "CellMachine", "CellMove", "CellReleased", "CellStopped",
     "CertificateNotice", "ClassStatistics", "Command", "CommandChange", "CommandState", "ConfigChange", "ConfigCheck", "ConfigFinding", "Configuration",
     "ConfigurationDrift", "ConfigurationReloaded", "Conviction", "Cursor", "Device", "Drive", "DriveInfo",
     "EepromWritten", "ErrorDetail", "Event", "FlightRecord", "FlightRecordWritten", "FoundNode", "Group", "GroupMember",
     "GroupMove", "Info", "InhibitChange", "Jog", "KeptFile", "KeptState", "KeptStateChange", "Latency", "Lease",
-    "LeaseChange", "LeaseInfo", "LeaseLostError", "Link", "LinkChange", "Machine", "MachineOutcome", "MachineRelease", "MachineState", "MachineStop", "MemberMachine", "MotionCause", "MotionError",
+    "LeaseChange", "LeaseInfo", "LeaseLostError", "Link", "LinkChange", "Machine", "MachineMove", "MachineOutcome", "MachineRelease", "MachineState", "MachineStop", "MemberMachine", "MotionCause", "MotionError",
     "MotionValues", "Network", "NetworkLink", "NodeStatistics", "Obstacle", "Outcome",
     "Parameter", "PermittedRange", "PositionSegment", "Quarantine", "Reason", "RefusedError", "Registry", "Reload", "Role", "ScanProgress", "Segments",
     "SerialProgress", "State", "StateChange", "StopAllLatch", "StopBudget", "StopError", "StopHold", "StopHoldChange", "StopResult", "Terminal", "TerminalCapability",

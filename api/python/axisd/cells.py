@@ -4,7 +4,7 @@ from __future__ import annotations
 import contextlib
 import os
 import pathlib
-from collections.abc import AsyncGenerator
+from collections.abc import AsyncGenerator, Mapping
 from types import TracebackType
 
 import grpc.aio
@@ -13,6 +13,7 @@ from .address import USUAL_CELL_PORT, with_port
 from .axis import Axis
 from .calls import Seconds
 from .cell.v1 import cell_service_pb2, cell_service_pb2_grpc
+from .cell_group import CellMove, request_of
 from .cell_lease import CellLease, split
 from .cell_types import CellEvent, CellInfo, CellMachine, CellReleased, CellStopped
 from .drives import Cursor
@@ -93,6 +94,23 @@ class Cell:
         """The exclusive right to command these axes inside an `async with` block: cell.lease("press-1/feeder",
         "press-2/arm"). `ttl` and `take` as of Machine.lease()."""
         return CellLease(self, axes, ttl, label, take)
+
+    async def move(self, targets: Mapping[str, float], *, relative: bool = False,
+                   velocity: Mapping[str, float] | None = None, acceleration_time: Seconds | None = None,
+                   deceleration_time: Seconds | None = None, clock_tolerance: Seconds | None = None,
+                   lease: CellLease | None = None, wait: bool = True, request_id: str | None = None) -> CellMove:
+        """Moves axes of several machines from one moment on, to positions (or by distances) by their names:
+        {"press-1/feeder": 100, "press-2/arm": 90}. All of them start, or none; whatever fails at one stops all, and they
+        stop within half a second where the entrance is gone. Waits until all have ended, unless `wait` is False. `lease`:
+        the one under which it moves. `clock_tolerance`: refused where a machine's clock is known less well (1 ms).
+        Raises as Group.move()."""
+        request = request_of(targets, relative, velocity or {}, acceleration_time, deceleration_time, clock_tolerance,
+                             lease, wait, request_id)
+        response = await self._entrance._call(self._cell.MoveGroup, request, ", ".join(sorted(targets)), wait)
+        move = CellMove.of(response.move)
+        if (failure := move.failure()) is not None:
+            raise failure
+        return move
 
     async def info(self) -> CellInfo:
         """The cell, its registry, what stands of StopAll, and who is asking."""
