@@ -115,7 +115,7 @@ Result<void> GroupRun::start_at(TimePoint at) {
   if (told && *told != at)
     return fail(Reason::request_id_conflict, "it was told to start at another moment", "ask how it stands");
   if (told) return {};
-  if (given_up()) return fail(cause_.value_or(Error{}));
+  if (given_up() || ended(state())) return fail(cause().value_or(Error{}));
   if (machine_.state() == State::preparing)
     return fail(Reason::busy, "it is not prepared yet", "wait for the answer to PrepareMove");
   const auto in = [now](TimePoint moment) { return in_seconds(moment - now); };

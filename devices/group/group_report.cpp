@@ -18,11 +18,19 @@ CommandState GroupRun::state() const {
   return CommandState::done;
 }
 
+/// Members that end at once are seen to shortly after.
+std::optional<Error> GroupRun::cause() const {
+  if (cause_ || !ended(state())) return cause_;
+  for (const auto& command : commands_)
+    if (const auto& value = command->value(); value.cause) return named(*value.cause, value.axis);
+  return std::nullopt;
+}
+
 GroupMove GroupRun::value() const {
   GroupMove move{.id = parts_.id,
                  .group = parts_.request.group,
                  .state = state(),
-                 .cause = cause_,
+                 .cause = cause(),
                  .arrive_together = parts_.request.arrive_together};
   std::vector<Duration> predicted;
   std::vector<TimePoint> starts, arrivals;

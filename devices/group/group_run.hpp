@@ -103,6 +103,7 @@ class GroupRun : public std::enable_shared_from_this<GroupRun> {
   void give_up(const Error& common);
   void begin_to_give_up(Error cause);
   void tell();
+  [[nodiscard]] std::optional<Error> cause() const;
   [[nodiscard]] bool given_up() const { return machine_.given_up(); }
 
   // group_moment.cpp

@@ -26,6 +26,19 @@ TEST(M22MomentEnd, WhatIsNotToldEndsByItself) {
   EXPECT_EQ(rig.complete(GroupRig::to({{"x", 5}, {"y", 5}, {"z", 5}, {"w", 5}})).state, CommandState::done);
 }
 
+/// Also to who asks in the moment in which it ends.
+TEST(M22MomentEnd, ItsEndIsToldWithItsCause) {
+  MomentRig rig;
+  const auto run = rig.prepare({{"x", 50}, {"y", 50}});
+  ASSERT_TRUE(rig.run_until([&] { return ended(run->state()); }, 5s));
+  const auto move = run->value();
+  EXPECT_EQ(move.state, CommandState::aborted);
+  ASSERT_TRUE(move.cause);
+  EXPECT_EQ(move.cause->reason, Reason::expired);
+  rig.run(1ms);
+  EXPECT_EQ(run->value().cause->message, move.cause->message);
+}
+
 /// While it waits its drives are read as those of any axis at rest: what happens to one ends the move.
 TEST(M22MomentEnd, WhatHappensToAMemberThatWaitsEndsTheMove) {
   for (const bool told : {false, true}) {
