@@ -11,30 +11,9 @@
 namespace axisd::cell {
 namespace {
 
-bool has_ended(axisd::v1::CommandState state) {
-  return state == axisd::v1::COMMAND_STATE_DONE || state == axisd::v1::COMMAND_STATE_ABORTED ||
-         state == axisd::v1::COMMAND_STATE_ERROR || state == axisd::v1::COMMAND_STATE_UNKNOWN;
-}
-
-Duration of(const google::protobuf::Duration& from) {
-  return std::chrono::seconds(from.seconds()) + Duration(from.nanos());
-}
-
-/// Errors keep their address: the machine's name stands before that of the axis.
-axisd::v1::ErrorDetail named(axisd::v1::ErrorDetail detail, const std::string& machine) {
-  detail.set_message(fmt::format("{}: {}", machine, detail.message()));
-  return detail;
-}
-
 axisd::v1::ErrorDetail told_too_late() {
   return detail_of(axisd::v1::REASON_EXPIRED, "it took too long until all machines were told to start",
                    "repeat the move with another request_id; look at the network if it is often so");
-}
-
-/// It may move, or may have moved, and nobody says how that ended.
-bool is_left_open(const axisd::v1::GroupMove& move) {
-  return !has_ended(move.state()) &&
-         (move.state() == axisd::v1::COMMAND_STATE_ACTIVE || move.preparation().has_starts_at());
 }
 
 std::string milliseconds(Duration time) {
@@ -42,6 +21,15 @@ std::string milliseconds(Duration time) {
 }
 
 }  // namespace
+
+bool has_ended(axisd::v1::CommandState state) {
+  return state == axisd::v1::COMMAND_STATE_DONE || state == axisd::v1::COMMAND_STATE_ABORTED ||
+         state == axisd::v1::COMMAND_STATE_ERROR || state == axisd::v1::COMMAND_STATE_UNKNOWN;
+}
+
+bool was_told(const axisd::v1::GroupMove& move) {
+  return move.state() == axisd::v1::COMMAND_STATE_ACTIVE || move.preparation().has_starts_at();
+}
 
 GroupMoveMachine::GroupMoveMachine(std::vector<std::string> machines, Duration clock_tolerance)
     : clock_tolerance_(clock_tolerance) {
@@ -64,40 +52,51 @@ GroupMoveMachine::Errands GroupMoveMachine::begin() {
 }
 
 void GroupMoveMachine::take(Part& part, const axisd::v1::GroupMove& move) {
+  google::protobuf::RepeatedPtrField<axisd::v1::GroupMember> members;
+  members.Swap(part.move.mutable_members());
   part.move = move;
+  if (move.members().empty()) {
+    // A renewal does not tell them. Once it is active, none of them waits.
+    part.move.mutable_members()->Swap(&members);
+    for (auto& member : *part.move.mutable_members())
+      if (move.state() == axisd::v1::COMMAND_STATE_ACTIVE &&
+          member.command().state() == axisd::v1::COMMAND_STATE_ACCEPTED)
+        member.mutable_command()->set_state(axisd::v1::COMMAND_STATE_ACTIVE);
+  }
+  const auto& preparation = move.preparation();
+  const bool elsewhere =
+      was_told(move) &&
+      (!part.at || (preparation.has_starts_at() && duration_of(preparation.starts_at()) != *part.at));
+  if (was_told(move)) may_have_started_ = true;
+  if (elsewhere) part.stage = Part::Stage::foreign;
   if (has_ended(move.state())) part.stage = Part::Stage::ended;
+  if (elsewhere && state_ != State::preparing) attach();
 }
 
 GroupMoveMachine::Errands GroupMoveMachine::prepared(std::size_t machine, const Answer& answer) {
   auto& part = parts_[machine];
-  Errands errands;
-  if (!answer.status.ok()) {
-    part.stage = Part::Stage::ended;
+  if (answer.status.ok()) {
+    part.stage = Part::Stage::prepared;
+    take(part, answer.move);
+    // It has ended before this answer: who knows in which attempt.
+    if (part.stage == Part::Stage::ended) may_have_started_ = true;
+  } else {
+    part.stage = Part::Stage::lost;
     part.error = detail_of(answer.status);
-    if (state_ == State::preparing) return fail(machine, answer.status, answer.received);
-    end_if_over();
-    return errands;
+    if (refusal_.ok()) refusal_ = to_status(answer.status.error_code(), named(*part.error, part.machine));
   }
-  const auto& preparation = answer.move.preparation();
-  const bool told = preparation.has_starts_at() || answer.move.state() == axisd::v1::COMMAND_STATE_ACTIVE;
-  part.stage = told ? Part::Stage::foreign : Part::Stage::prepared;
-  take(part, answer.move);
-  if (state_ == State::giving_up) {
-    stop_part(machine, errands);
-    end_if_over();
-  } else if (state_ == State::preparing && !any(Part::Stage::asked)) {
-    return judge_prepared(answer.received);
-  }
-  return errands;
+  return any(Part::Stage::asked) ? Errands{} : judge_prepared(answer.received);
 }
 
-/// All have answered, and none refuses. A request that is repeated finds what became of it before.
+/// All have answered. A request that is repeated finds what became of it before.
 GroupMoveMachine::Errands GroupMoveMachine::judge_prepared(TimePoint now) {
   Errands errands;
   if (any(Part::Stage::foreign)) {
     attach();
+  } else if (!refusal_.ok()) {
+    return give_up(detail_of(refusal_), refusal_.error_code(), now);
   } else if (all(Part::Stage::ended)) {
-    state_ = State::over;
+    end();
   } else if (any(Part::Stage::ended)) {
     const auto ended = std::ranges::find(parts_, Part::Stage::ended, &Part::stage);
     auto cause = ended->move.has_cause()
@@ -121,6 +120,7 @@ bool GroupMoveMachine::goes_on(std::size_t machine, const Answer& answer, Errand
     return false;
   }
   take(part, answer.move);
+  if (state_ == State::attached || state_ == State::over) return false;
   if (part.stage != Part::Stage::ended || part.move.state() == axisd::v1::COMMAND_STATE_DONE) return true;
   errands = give_up(named(part.move.cause(), part.machine), grpc::StatusCode::ABORTED, answer.received);
   return false;
@@ -151,12 +151,12 @@ GroupMoveMachine::Errands GroupMoveMachine::measured(std::size_t machine, const 
 /// As soon as all can be told, and every one has had its last look at its members.
 GroupMoveMachine::Errands GroupMoveMachine::choose_moment(TimePoint now) {
   Duration notice{};
-  for (const auto& part : parts_) notice = std::max(notice, of(part.move.preparation().notice()));
+  for (const auto& part : parts_) notice = std::max(notice, duration_of(part.move.preparation().notice()));
   const auto moment = now + notice + lead;
   Errands errands;
   for (std::size_t i = 0; i < parts_.size(); ++i) {
     const auto at = (moment + parts_[i].clock.at(now)->offset).time_since_epoch();
-    if (at > of(parts_[i].move.preparation().expires()))
+    if (at > duration_of(parts_[i].move.preparation().expires()))
       return give_up(
           detail_of(axisd::v1::REASON_EXPIRED,
                     fmt::format("{}: it took too long until all machines were prepared", parts_[i].machine),
@@ -165,6 +165,8 @@ GroupMoveMachine::Errands GroupMoveMachine::choose_moment(TimePoint now) {
           grpc::StatusCode::DEADLINE_EXCEEDED, now);
     errands.push_back({.kind = Errand::Kind::tell, .machine = i, .at = at});
   }
+  for (const auto& errand : errands) parts_[errand.machine].at = errand.at;
+  may_have_started_ = true;
   latest_told_ = now + lead / 2;  // the rest is for the word that all were
   state_ = State::telling;
   return errands;
@@ -173,10 +175,7 @@ GroupMoveMachine::Errands GroupMoveMachine::choose_moment(TimePoint now) {
 GroupMoveMachine::Errands GroupMoveMachine::told(std::size_t machine, const Answer& answer) {
   Errands errands;
   auto& part = parts_[machine];
-  if (state_ == State::giving_up && part.stage == Part::Stage::prepared && answer.status.ok()) {
-    take(part, answer.move);  // it was stopped already
-    end_if_over();
-  }
+  if (state_ == State::giving_up) return take_while_giving_up(machine, answer);
   if (state_ != State::telling) return errands;
   if (!answer.status.ok() && detail_of(answer.status).reason() == axisd::v1::REASON_REQUEST_ID_CONFLICT) {
     part.stage = Part::Stage::foreign;
@@ -202,14 +201,13 @@ GroupMoveMachine::Errands GroupMoveMachine::renewed(std::size_t machine, const A
   Errands errands;
   auto& part = parts_[machine];
   if (part.stage == Part::Stage::ended) return errands;  // another answer was faster
-  if (state_ == State::giving_up && answer.status.ok()) {
-    take(part, answer.move);
-    end_if_over();
-  }
+  if (state_ == State::giving_up) return take_while_giving_up(machine, answer);
   if (state_ != State::running && state_ != State::telling) return errands;
+  const bool has_started = part.move.preparation().has_first_start();
   if (!goes_on(machine, answer, errands)) return errands;
-  part.clock.add(answer.sent, answer.received, answer.clock);
-  if (state_ == State::running && all(Part::Stage::ended)) state_ = State::over;
+  // Later ones would push out those that are nearest to its start, which tell best when that was.
+  if (!has_started) part.clock.add(answer.sent, answer.received, answer.clock);
+  if (state_ == State::running && all(Part::Stage::ended)) end();
   return errands;
 }
 
@@ -224,37 +222,55 @@ GroupMoveMachine::Errands GroupMoveMachine::cancelled(std::size_t machine, const
 
 GroupMoveMachine::Errands GroupMoveMachine::looked(std::size_t machine, const Answer& answer) {
   auto& part = parts_[machine];
+  if (state_ == State::giving_up) return take_while_giving_up(machine, answer);
+  if (state_ != State::attached || is_out(part)) return {};
   if (answer.status.ok()) {
     take(part, answer.move);
-  } else if (state_ == State::attached ||
-             detail_of(answer.status).reason() == axisd::v1::REASON_UNKNOWN_COMMAND) {
-    // Its axisd was started anew, which starts nothing; or nobody can be asked.
+  } else {
     part.error = detail_of(answer.status);
-    part.stage = Part::Stage::ended;
+    part.stage = Part::Stage::lost;
   }
   end_if_over();
   return {};
+}
+
+GroupMoveMachine::Errands GroupMoveMachine::take_while_giving_up(std::size_t machine, const Answer& answer) {
+  auto& part = parts_[machine];
+  Errands errands;
+  if (is_out(part)) return errands;
+  if (answer.status.ok()) {
+    take(part, answer.move);
+    if (state_ == State::giving_up) stop_part(machine, errands);
+  } else if (detail_of(answer.status).reason() == axisd::v1::REASON_UNKNOWN_COMMAND) {
+    part.error = detail_of(answer.status);  // its axisd was started anew, which starts nothing
+    part.stage = Part::Stage::ended;
+  }
+  end_if_over();
+  return errands;
 }
 
 GroupMoveMachine::Errands GroupMoveMachine::tick(TimePoint now) {
   Errands errands;
   if (state_ == State::telling && now > latest_told_)
     return give_up(told_too_late(), grpc::StatusCode::ABORTED, now);
+  if (state_ == State::giving_up && now >= end_by_) {
+    end();
+    return errands;
+  }
   const bool renews = state_ == State::telling || state_ == State::running;
-  const bool looks = state_ == State::giving_up || state_ == State::attached;
   for (std::size_t i = 0; i < parts_.size(); ++i) {
     auto& part = parts_[i];
-    if (part.stage == Part::Stage::asked || part.stage == Part::Stage::ended || now < part.next) continue;
+    if (is_out(part) || now < part.next) continue;
     if (renews && part.stage == Part::Stage::told) {
       part.next = now + renewal_period;
       errands.push_back({.kind = Errand::Kind::renew, .machine = i, .all_told = state_ == State::running});
-    } else if (looks) {
+    } else if (state_ == State::giving_up) {
+      end_part(i, now, errands);
+    } else if (state_ == State::attached) {
       part.next = now + look_period;
-      if (state_ == State::giving_up) stop_part(i, errands);
       errands.push_back({.kind = Errand::Kind::look, .machine = i});
     }
   }
-  if (state_ == State::giving_up && now >= end_by_) state_ = State::over;
   return errands;
 }
 
@@ -265,38 +281,51 @@ GroupMoveMachine::Errands GroupMoveMachine::fail(std::size_t machine, const grpc
 
 GroupMoveMachine::Errands GroupMoveMachine::give_up(axisd::v1::ErrorDetail cause, grpc::StatusCode code,
                                                     TimePoint now) {
-  if (state_ == State::preparing || state_ == State::measuring) refusal_ = to_status(code, cause);
+  refusal_ = to_status(code, cause);
   cause_ = std::move(cause);
   state_ = State::giving_up;
   end_by_ = now + longest_end;
   Errands errands;
-  for (std::size_t i = 0; i < parts_.size(); ++i) {
-    parts_[i].next = now;
-    stop_part(i, errands);
-  }
+  for (std::size_t i = 0; i < parts_.size(); ++i) end_part(i, now, errands);
   end_if_over();
   return errands;
 }
 
+void GroupMoveMachine::end_part(std::size_t machine, TimePoint now, Errands& errands) {
+  auto& part = parts_[machine];
+  if (is_out(part)) return;
+  part.next = now + look_period;
+  if (part.stage == Part::Stage::told) stop_part(machine, errands);
+  errands.push_back({.kind = Errand::Kind::look, .machine = machine});
+}
+
 void GroupMoveMachine::stop_part(std::size_t machine, Errands& errands) {
   auto& part = parts_[machine];
-  if (part.stage == Part::Stage::asked || part.stage == Part::Stage::ended ||
-      part.stage == Part::Stage::foreign || part.stopping)
-    return;
+  if (is_out(part) || part.stopping) return;
   part.stopping = true;
   errands.push_back({.kind = Errand::Kind::cancel, .machine = machine});
 }
 
 void GroupMoveMachine::end_if_over() {
-  const bool left = std::ranges::any_of(parts_, [this](const Part& part) {
-    return part.stage != Part::Stage::ended &&
-           !(state_ == State::giving_up && part.stage == Part::Stage::foreign);
-  });
-  if (!left && (state_ == State::giving_up || state_ == State::attached)) state_ = State::over;
+  if (std::ranges::all_of(parts_, is_out) && (state_ == State::giving_up || state_ == State::attached)) end();
+}
+
+void GroupMoveMachine::end() {
+  state_ = State::over;
+  ended_as_ = make_value();
+  for (auto& part : parts_) {
+    part.move.Clear();
+    part.clock = {};
+  }
 }
 
 /// What was told by this entrance is not renewed any more, and starts nothing; the other entrance decides.
-void GroupMoveMachine::attach() { state_ = State::attached; }
+void GroupMoveMachine::attach() {
+  may_have_started_ = true;
+  cause_.reset();  // why this entrance would not go on
+  state_ = State::attached;
+  end_if_over();
+}
 
 bool GroupMoveMachine::reached(axisd::v1::WaitUntil until) const {
   if (state_ == State::over) return true;
@@ -305,85 +334,6 @@ bool GroupMoveMachine::reached(axisd::v1::WaitUntil until) const {
     return std::ranges::all_of(
         parts_, [](const Part& part) { return part.move.state() != axisd::v1::COMMAND_STATE_ACCEPTED; });
   return until != axisd::v1::WAIT_UNTIL_DONE;
-}
-
-/// While one has not ended, the move has not, either.
-axisd::v1::CommandState GroupMoveMachine::result() const {
-  const auto any_is = [this](axisd::v1::CommandState state) {
-    return std::ranges::any_of(parts_, [state](const Part& part) { return part.move.state() == state; });
-  };
-  if (state_ != State::over)
-    return any_is(axisd::v1::COMMAND_STATE_ACCEPTED) || any_is(axisd::v1::COMMAND_STATE_UNSPECIFIED)
-               ? axisd::v1::COMMAND_STATE_ACCEPTED
-               : axisd::v1::COMMAND_STATE_ACTIVE;
-  if (any_is(axisd::v1::COMMAND_STATE_UNKNOWN) || any(Part::Stage::told) ||
-      std::ranges::any_of(parts_, is_left_open, &Part::move))
-    return axisd::v1::COMMAND_STATE_UNKNOWN;
-  for (const auto worst : {axisd::v1::COMMAND_STATE_ERROR, axisd::v1::COMMAND_STATE_ABORTED})
-    if (any_is(worst)) return worst;
-  return cause_ || any_is(axisd::v1::COMMAND_STATE_ACCEPTED) ? axisd::v1::COMMAND_STATE_ABORTED
-                                                             : axisd::v1::COMMAND_STATE_DONE;
-}
-
-std::vector<std::string> GroupMoveMachine::commands_at(std::size_t machine) const {
-  std::vector<std::string> ids;
-  for (const auto& member : parts_[machine].move.members())
-    if (!has_ended(member.command().state())) ids.push_back(member.command().id());
-  return ids;
-}
-
-v1::CellGroupMove GroupMoveMachine::value() const {
-  v1::CellGroupMove to;
-  to.set_state(result());
-  if (cause_) *to.mutable_cause() = *cause_;
-  for (const auto& part : parts_) {
-    auto& machine = *to.add_machines();
-    machine.set_machine(part.machine);
-    *machine.mutable_move() = part.move;
-    if (part.error) *machine.mutable_error() = *part.error;
-    if (!to.has_cause() && part.move.has_cause())
-      *to.mutable_cause() = named(part.move.cause(), part.machine);
-  }
-  fill_skew(to);
-  return to;
-}
-
-/// By this computer's clock, as far as it is known how far the others' are from it.
-void GroupMoveMachine::fill_skew(v1::CellGroupMove& to) const {
-  std::optional<TimePoint> first, last;
-  Duration largest_error{}, second_error{};
-  bool all_started = true;
-  std::vector<std::optional<TimePoint>> starts(parts_.size());
-  for (std::size_t i = 0; i < parts_.size(); ++i) {
-    const auto& move = parts_[i].move;
-    const auto& preparation = move.preparation();
-    if (!preparation.has_first_start()) {
-      // Its members stood at their targets.
-      all_started = all_started && move.state() == axisd::v1::COMMAND_STATE_DONE;
-      continue;
-    }
-    const TimePoint by_its_clock(of(preparation.first_start()));
-    const auto near = parts_[i].clock.at(by_its_clock);
-    if (!near) return;  // another entrance knows
-    const auto clock = *parts_[i].clock.at(by_its_clock - near->offset);
-    starts[i] = by_its_clock - clock.offset;
-    all_started = all_started && move.has_start_skew();
-    first = first ? std::min(*first, *starts[i]) : *starts[i];
-    const auto latest = *starts[i] + of(move.start_skew());
-    last = last ? std::max(*last, latest) : latest;
-    auto& machine = *to.mutable_machines(static_cast<int>(i));
-    set_duration(*machine.mutable_clock_offset(), clock.offset);
-    set_duration(*machine.mutable_clock_error(), clock.error);
-    second_error = std::max(second_error, std::min(largest_error, clock.error));
-    largest_error = std::max(largest_error, clock.error);
-  }
-  if (!first) return;
-  for (std::size_t i = 0; i < parts_.size(); ++i)
-    if (starts[i])
-      set_duration(*to.mutable_machines(static_cast<int>(i))->mutable_started_after(), *starts[i] - *first);
-  if (!all_started) return;
-  set_duration(*to.mutable_start_skew(), *last - *first);
-  set_duration(*to.mutable_start_skew_error(), largest_error + second_error);
 }
 
 }  // namespace axisd::cell

@@ -14,23 +14,29 @@
 
 namespace axisd::cell {
 
+[[nodiscard]] bool has_ended(axisd::v1::CommandState state);
+/// It was told to start, by whomever.
+[[nodiscard]] bool was_told(const axisd::v1::GroupMove& move);
+
 /// Each machine prepares its part, tells its clock, is told a moment of that clock, and is renewed from then
 /// on. It starts only once a renewal has said that all were told, and stops by itself where renewals end: so
 /// where this process is gone, none starts, or all stop.
 ///
 ///   preparing --- all are prepared ------------------> measuring
 ///   preparing --- all have ended --------------------> over       a repeated request
-///   preparing --- one was told before ---------------> attached   by another entrance, for the same request
 ///   measuring --- all clocks are known well enough --> telling
 ///   telling ----- all have taken their moment -------> running
-///   telling ----- one has another moment ------------> attached
 ///   running ----- all are done ----------------------> over
 ///   attached ---- all have ended, or cannot be asked > over
 ///   preparing, measuring, telling, running
 ///            ---- one refuses, fails, ends or is lost, or it is too late --> giving_up
 ///   giving_up --- all have ended, or no longer answer --------------------> over
+///   any but over
+///            ---- another entrance has told one, for the same request -----> attached
 ///
-/// Only `giving_up` stops anybody, and nobody is stopped whom another entrance has told. Thread: core.
+/// What one refuses or does not answer while it is prepared is judged once all have answered: another
+/// entrance may have told one of the others. Only `giving_up` stops anybody: at once whom this entrance has
+/// told; whoever waits for a moment, once it has said that nobody else has told it. Thread: core.
 class GroupMoveMachine {
  public:
   enum class State : std::uint8_t {
@@ -84,16 +90,20 @@ class GroupMoveMachine {
   [[nodiscard]] Errands tick(TimePoint now);
 
   [[nodiscard]] State state() const { return state_; }
-  /// How it stands, as far as is known.
-  [[nodiscard]] v1::CellGroupMove value() const;
+  /// How it stands, as far as is known; once it is over, how it ended.
+  [[nodiscard]] v1::CellGroupMove value() const { return ended_as_ ? *ended_as_ : make_value(); }
   /// It has come as far, or is over.
   [[nodiscard]] bool reached(axisd::v1::WaitUntil until) const;
   /// Of the move at this machine; empty: it is not prepared.
   [[nodiscard]] const std::string& id_at(std::size_t machine) const { return parts_[machine].move.id(); }
   /// Its commands that have not ended, as far as is known.
   [[nodiscard]] std::vector<std::string> commands_at(std::size_t machine) const;
-  /// Why nothing of it was started, nor will be; OK: something may have been.
-  [[nodiscard]] const grpc::Status& refusal() const { return refusal_; }
+  /// Something of it may have been started: by this entrance, another one, or an earlier attempt.
+  [[nodiscard]] bool may_have_started() const { return may_have_started_; }
+  /// Once it is over, why this entrance has started nothing. OK: something may have been started.
+  [[nodiscard]] const grpc::Status& refusal() const {
+    return may_have_started_ ? grpc::Status::OK : refusal_;
+  }
 
  private:
   struct Part {
@@ -103,9 +113,11 @@ class GroupMoveMachine {
       told,      ///< it has its moment
       foreign,   ///< another entrance has told it
       ended,     ///< nothing of it moves, or will, as far as is known
+      lost,      ///< it refused this entrance, or cannot be asked: of an earlier attempt it says nothing
     };
     std::string machine;
     Stage stage = Stage::asked;
+    std::optional<Duration> at{};  ///< that this entrance has told it, or is about to
     axisd::v1::GroupMove move{};
     std::optional<axisd::v1::ErrorDetail> error{};
     ClockSamples clock{};
@@ -115,17 +127,28 @@ class GroupMoveMachine {
 
   [[nodiscard]] bool all(Part::Stage stage) const;
   [[nodiscard]] bool any(Part::Stage stage) const;
+  [[nodiscard]] static bool is_out(const Part& part) {
+    return part.stage == Part::Stage::ended || part.stage == Part::Stage::lost;
+  }
   /// What a machine says of its part.
   void take(Part& part, const axisd::v1::GroupMove& move);
-  /// Of an answer in `state`: its move, or the end of all. False: it ends all.
+  /// Takes an answer. False: it ends all, or another entrance has told the machine.
   [[nodiscard]] bool goes_on(std::size_t machine, const Answer& answer, Errands& errands);
   [[nodiscard]] Errands judge_prepared(TimePoint now);
   [[nodiscard]] Errands choose_moment(TimePoint now);
   [[nodiscard]] Errands give_up(axisd::v1::ErrorDetail cause, grpc::StatusCode code, TimePoint now);
   [[nodiscard]] Errands fail(std::size_t machine, const grpc::Status& status, TimePoint now);
+  /// Of an answer of any kind, while all are stopped.
+  [[nodiscard]] Errands take_while_giving_up(std::size_t machine, const Answer& answer);
+  /// One that has not ended is stopped if this entrance has told it, and looked at.
+  void end_part(std::size_t machine, TimePoint now, Errands& errands);
   void stop_part(std::size_t machine, Errands& errands);
   void end_if_over();
+  /// Only how it ended is kept.
+  void end();
   void attach();
+  // group_move_report.cpp
+  [[nodiscard]] v1::CellGroupMove make_value() const;
   [[nodiscard]] axisd::v1::CommandState result() const;
   void fill_skew(v1::CellGroupMove& to) const;
 
@@ -133,7 +156,9 @@ class GroupMoveMachine {
   const Duration clock_tolerance_;
   std::vector<Part> parts_;
   std::optional<axisd::v1::ErrorDetail> cause_;
-  grpc::Status refusal_;
+  grpc::Status refusal_;  ///< why this entrance would not go on
+  bool may_have_started_ = false;
+  std::optional<v1::CellGroupMove> ended_as_;
   TimePoint latest_told_{};  ///< all have to be told by then
   TimePoint end_by_ = TimePoint::max();
 };

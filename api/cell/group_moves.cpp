@@ -10,6 +10,7 @@
 #include "api/cell/names.hpp"
 #include "api/cell/roster.hpp"
 #include "api/cell/status.hpp"
+#include "api/tls/digest.hpp"
 #include "axisd/v1/command_service.pb.h"
 #include "buses/limited_log.hpp"
 #include "config/text.hpp"
@@ -36,12 +37,41 @@ grpc::Status invalid(std::string message, std::string remedy) {
                    std::move(remedy));
 }
 
-Duration of(const google::protobuf::Duration& from) {
-  return std::chrono::seconds(from.seconds()) + Duration(from.nanos());
+Duration tolerance_of(const v1::MoveGroupRequest& request) {
+  return request.has_clock_tolerance() ? duration_of(request.clock_tolerance()) : usual_tolerance;
 }
 
-Duration tolerance_of(const v1::MoveGroupRequest& request) {
-  return request.has_clock_tolerance() ? of(request.clock_tolerance()) : usual_tolerance;
+grpc::Status check_tolerance(const v1::MoveGroupRequest& request) {
+  const auto& asked = request.clock_tolerance();
+  const bool valid = asked.seconds() >= 0 && asked.nanos() >= 0 && asked.nanos() < 1'000'000'000;
+  const auto tolerance = tolerance_of(request);
+  if (valid && tolerance > Duration::zero() && tolerance <= longest_tolerance) return grpc::Status::OK;
+  return invalid("clock_tolerance is no such time", "give more than 0 s, and at most 1 s");
+}
+
+/// What this entrance keeps while the move is under way; what a target may be is for the owner of its axis.
+grpc::Status check_size(const v1::MoveGroupRequest& request) {
+  if (request.machines().empty() ||
+      static_cast<std::size_t>(request.machines_size()) > GroupMoves::most_machines)
+    return invalid("no machine is named, or too many are",
+                   fmt::format("name 1 to {}, each with targets", GroupMoves::most_machines));
+  int targets = 0;
+  for (const auto& part : request.machines()) {
+    targets += part.targets_size();
+    for (const auto& target : part.targets())
+      if (target.axis().size() > GroupMoves::longest_name)
+        return invalid(fmt::format("{}: the name of an axis has {} bytes", config::quoted(part.machine()),
+                                   target.axis().size()),
+                       fmt::format("names have {} at most", GroupMoves::longest_name));
+  }
+  if (targets > GroupMoves::most_targets)
+    return invalid(fmt::format("{} targets are given", targets),
+                   fmt::format("give at most {} in one move", GroupMoves::most_targets));
+  // With all that is not known here.
+  if (request.ByteSizeLong() > GroupMoves::most_bytes)
+    return invalid(fmt::format("the request has {} bytes", request.ByteSizeLong()),
+                   fmt::format("give at most {}", GroupMoves::most_bytes));
+  return grpc::Status::OK;
 }
 
 std::vector<std::string> names_of(const v1::MoveGroupRequest& request) {
@@ -50,17 +80,26 @@ std::vector<std::string> names_of(const v1::MoveGroupRequest& request) {
   return names;
 }
 
-/// What a request with the same id has to have in common with it.
-std::string content_of(v1::MoveGroupRequest request) {
+/// Of what a request with the same id has to have in common with it.
+std::string digest_of(v1::MoveGroupRequest request) {
   request.mutable_options()->clear_wait_until();
-  return request.SerializeAsString();
+  return tls::digest_of(request.SerializeAsString());
+}
+
+grpc::Status ended_in_motion() {
+  return to_status(
+      grpc::StatusCode::UNAVAILABLE, axisd::v1::REASON_CANCELLED,
+      "axisd-cell is shutting down; the move may have run in part, and its machines stop it where "
+      "no other entrance coordinates it",
+      "repeat it with the same request_id at another entrance: that tells what became of it");
 }
 
 }  // namespace
 
 struct GroupMoves::Run {
   Caller caller;
-  v1::MoveGroupRequest request;
+  std::string request_id, digest;
+  v1::MoveGroupRequest request;  ///< empty once it is over
   Metadata metadata;
   std::vector<Way> ways{};  ///< of each machine, as they were at the beginning
   GroupMoveMachine machine;
@@ -71,11 +110,20 @@ struct GroupMoves::Run {
   std::vector<Waiter> waiters{};
   Clock::Timer timer{};
 
-  [[nodiscard]] const std::string& request_id() const { return request.options().request_id(); }
   [[nodiscard]] bool over() const { return machine.state() == State::over; }
 };
 
-grpc::Status GroupMoves::check(const Caller& caller, const v1::MoveGroupRequest& request) const {
+grpc::Status GroupMoves::check(const Caller& caller, const v1::MoveGroupRequest& request) {
+  if (!caller.local && caller.role < CellRole::operator_)
+    return to_status(grpc::StatusCode::PERMISSION_DENIED, axisd::v1::REASON_ACCESS_DENIED,
+                     fmt::format("{} has the role {} at this entrance", config::quoted(caller.name),
+                                 to_string(caller.role)),
+                     "an operator may do it: `roles` of cell.yaml says who is one");
+  if (!Callers::metadata_for(caller))
+    return to_status(
+        grpc::StatusCode::PERMISSION_DENIED, axisd::v1::REASON_ACCESS_DENIED,
+        fmt::format("{} is a name that axisd does not take from a delegate", config::quoted(caller.name)),
+        "use a certificate with a name of at most 64 characters without spaces");
   const auto& options = request.options();
   // The rest is for the owners of the axes.
   if (options.request_id().empty() || options.request_id().size() > 128)
@@ -84,30 +132,23 @@ grpc::Status GroupMoves::check(const Caller& caller, const v1::MoveGroupRequest&
   if (options.lease_token() != 0 || options.buffer_mode() != axisd::v1::BUFFER_MODE_UNSPECIFIED)
     return invalid("options.lease_token and options.buffer_mode have no meaning here",
                    "leave them out; the token of a lease is that of each machine");
-  if (request.machines().empty() || static_cast<std::size_t>(request.machines_size()) > most_machines)
-    return invalid("no machine is named, or too many are",
-                   fmt::format("name 1 to {}, each with targets", most_machines));
+  if (auto size = check_size(request); !size.ok()) return size;
   std::set<std::string> seen;
   for (const auto& part : request.machines())
     if (!is_machine_name(part.machine()) || part.targets().empty() || !seen.insert(part.machine()).second)
       return invalid(fmt::format("{} is no machine's name, has no targets, or is named twice",
                                  config::quoted(part.machine())),
                      "name each machine once, with its targets");
-  const auto tolerance = tolerance_of(request);
-  if (tolerance <= Duration::zero() || tolerance > longest_tolerance)
-    return invalid("clock_tolerance is no such time", "give more than 0 s, and at most 1 s");
-  if (!Callers::metadata_for(caller))
-    return to_status(
-        grpc::StatusCode::PERMISSION_DENIED, axisd::v1::REASON_ACCESS_DENIED,
-        fmt::format("{} is a name that axisd does not take from a delegate", config::quoted(caller.name)),
-        "use a certificate with a name of at most 64 characters without spaces");
+  return check_tolerance(request);
+}
+
+grpc::Status GroupMoves::check_room(const Caller& caller) const {
   const auto of_caller = std::ranges::count_if(
       runs_, [&](const RunPtr& run) { return !run->over() && run->caller.name == caller.name; });
-  if (of_caller >= most_of_one || open() >= most)
-    return to_status(grpc::StatusCode::RESOURCE_EXHAUSTED, axisd::v1::REASON_BUSY,
-                     fmt::format("{} moves of several machines are under way at this entrance", open()),
-                     "wait until one has ended, or ask another entrance");
-  return grpc::Status::OK;
+  if (of_caller < most_of_one && open() < most) return grpc::Status::OK;
+  return to_status(grpc::StatusCode::RESOURCE_EXHAUSTED, axisd::v1::REASON_BUSY,
+                   fmt::format("{} moves of several machines are under way at this entrance", open()),
+                   "wait until one has ended, or ask another entrance");
 }
 
 grpc::Status GroupMoves::connect(Run& run) const {
@@ -119,9 +160,10 @@ grpc::Status GroupMoves::connect(Run& run) const {
                        fmt::format("no machine {} is known in this cell", config::quoted(part.machine())),
                        "CellService.ListMachines tells which there are");
     if (!found->second.open)
-      return to_status(grpc::StatusCode::UNAVAILABLE, axisd::v1::REASON_OFFLINE,
-                       fmt::format("{}: {}", part.machine(), found->second.why),
-                       "check its power, its network, and that axisd runs there; nothing was sent");
+      return to_status(
+          grpc::StatusCode::UNAVAILABLE, axisd::v1::REASON_OFFLINE,
+          fmt::format("{}: {}", part.machine(), found->second.why),
+          "check its power, its network, and that axisd runs there; nothing was sent by this entrance");
     run.ways.push_back(found->second.way);
   }
   return grpc::Status::OK;
@@ -129,23 +171,27 @@ grpc::Status GroupMoves::connect(Run& run) const {
 
 GroupMoves::RunPtr GroupMoves::find(const Caller& caller, const std::string& request_id) const {
   const auto found = std::ranges::find_if(runs_, [&](const RunPtr& run) {
-    return run->caller.name == caller.name && run->request_id() == request_id;
+    return run->caller.name == caller.name && run->request_id == request_id;
   });
   return found == runs_.end() ? nullptr : *found;
 }
 
 void GroupMoves::move(const Caller& caller, const v1::MoveGroupRequest& request, Answer answer) {
+  if (const auto valid = check(caller, request); !valid.ok()) return answer(valid, {});
   const auto until = request.options().wait_until();
+  auto digest = digest_of(request);
   if (const auto known = find(caller, request.options().request_id())) {
-    if (content_of(known->request) != content_of(request))
+    if (known->digest != digest)
       return answer(to_status(grpc::StatusCode::ALREADY_EXISTS, axisd::v1::REASON_REQUEST_ID_CONFLICT,
                               "this request_id was used for another move", "give each move an id of its own"),
                     {});
     known->waiters.push_back({.until = until, .answer = std::move(answer)});
     return settle(known);
   }
-  if (const auto valid = check(caller, request); !valid.ok()) return answer(valid, {});
+  if (const auto room = check_room(caller); !room.ok()) return answer(room, {});
   auto run = std::make_shared<Run>(Run{.caller = caller,
+                                       .request_id = request.options().request_id(),
+                                       .digest = std::move(digest),
                                        .request = request,
                                        .metadata = *Callers::metadata_for(caller),
                                        .machine = {names_of(request), tolerance_of(request)}});
@@ -170,7 +216,8 @@ void GroupMoves::forget_oldest() {
 void GroupMoves::end(const grpc::Status& why) {
   for (const auto& run : std::exchange(runs_, {})) {
     run->timer.reset();
-    for (const auto& waiter : std::exchange(run->waiters, {})) waiter.answer(why, {});
+    const auto status = run->machine.may_have_started() ? ended_in_motion() : why;
+    for (const auto& waiter : std::exchange(run->waiters, {})) waiter.answer(status, {});
   }
 }
 
@@ -183,9 +230,12 @@ void GroupMoves::tick(const RunPtr& run) {
   });
 }
 
-/// Whoever waits hears what they wait for; what is over needs no connections.
+/// Whoever waits hears what they wait for; what is over needs neither connections nor its request.
 void GroupMoves::settle(const RunPtr& run) {
-  if (run->over()) run->ways.clear();
+  if (run->over()) {
+    run->ways.clear();
+    run->request.Clear();
+  }
   auto& waiters = run->waiters;
   for (auto waiter = waiters.begin(); waiter != waiters.end();) {
     if (!run->machine.reached(waiter->until)) {
@@ -208,7 +258,7 @@ auto GroupMoves::taker(const RunPtr& run, std::size_t machine, Event event) {
     if (!alive) return;
     GroupMoveMachine::Answer answer{
         .sent = sent, .received = clock_.now(), .status = status, .move = response.move()};
-    if constexpr (requires { response.clock(); }) answer.clock = of(response.clock());
+    if constexpr (requires { response.clock(); }) answer.clock = duration_of(response.clock());
     const auto before = alive->machine.state();
     const auto errands = (alive->machine.*event)(machine, answer);
     if (before != alive->machine.state() && alive->machine.state() == State::giving_up)

@@ -30,7 +30,8 @@ class GroupMoves {
   /// Begins a move, or attaches to the one of that request_id. `answer`: once it has come as far as the
   /// request says, or was refused.
   void move(const Caller& caller, const v1::MoveGroupRequest& request, Answer answer);
-  /// Nobody is renewed any more, so that all stop by themselves; whoever waits is told.
+  /// Nobody is renewed any more, so that all stop by themselves; whoever waits is told `why`, or that the
+  /// move may have run in part.
   void end(const grpc::Status& why);
   /// That have not ended.
   [[nodiscard]] int open() const;
@@ -40,12 +41,16 @@ class GroupMoves {
   /// So many that have ended are remembered, for those who ask again.
   static constexpr std::size_t most_ended = 256;
   static constexpr std::size_t most_machines = 128;
+  /// Of one request, over all machines.
+  static constexpr int most_targets = 1024;
+  static constexpr std::size_t longest_name = 64, most_bytes = 256 * 1024;
 
  private:
   struct Run;
   using RunPtr = std::shared_ptr<Run>;
   [[nodiscard]] RunPtr find(const Caller& caller, const std::string& request_id) const;
-  [[nodiscard]] grpc::Status check(const Caller& caller, const v1::MoveGroupRequest& request) const;
+  [[nodiscard]] static grpc::Status check(const Caller& caller, const v1::MoveGroupRequest& request);
+  [[nodiscard]] grpc::Status check_room(const Caller& caller) const;
   /// The connections to its machines; or why one cannot be asked.
   [[nodiscard]] grpc::Status connect(Run& run) const;
   void perform(const RunPtr& run, const GroupMoveMachine::Errands& errands);

@@ -26,6 +26,12 @@ void set_duration(google::protobuf::Duration& to, Duration duration) {
   to = TimeUtil::NanosecondsToDuration(duration.count());
 }
 
+Duration duration_of(const google::protobuf::Duration& from) {
+  constexpr std::int64_t longest = 30LL * 365 * 24 * 3600;
+  return std::chrono::seconds(std::clamp<std::int64_t>(from.seconds(), -longest, longest)) +
+         Duration(from.nanos());
+}
+
 Roster::Entry* Roster::enter(const kept::Registration& registration, TimePoint now) {
   auto found = entries_.find(registration.name());
   if (found == entries_.end()) {

@@ -80,5 +80,7 @@ class Roster {
 /// What the contract's fields of a time are.
 void set_time(google::protobuf::Timestamp& to, WallTime time);
 void set_duration(google::protobuf::Duration& to, Duration duration);
+/// As somebody else says it: cut to 30 years either way, so that any two can be added.
+[[nodiscard]] Duration duration_of(const google::protobuf::Duration& from);
 
 }  // namespace axisd::cell

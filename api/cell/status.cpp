@@ -71,6 +71,11 @@ axisd::v1::ErrorDetail detail_of(const grpc::Status& status) {
   return detail;
 }
 
+axisd::v1::ErrorDetail named(axisd::v1::ErrorDetail detail, const std::string& machine) {
+  detail.set_message(fmt::format("{}: {}", machine, detail.message()));
+  return detail;
+}
+
 axisd::v1::ErrorDetail detail_of(const Error& error) {
   return detail_of(axisd::v1::REASON_STORAGE, error.message, error.remedy);
 }

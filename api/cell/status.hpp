@@ -18,6 +18,8 @@ namespace axisd::cell {
                                      std::string remedy);
 /// What somebody else answered; its own words where it has no detail.
 [[nodiscard]] axisd::v1::ErrorDetail detail_of(const grpc::Status& status);
+/// With its address: the machine's name stands before that of the axis.
+[[nodiscard]] axisd::v1::ErrorDetail named(axisd::v1::ErrorDetail detail, const std::string& machine);
 /// REASON_STORAGE.
 [[nodiscard]] axisd::v1::ErrorDetail detail_of(const Error& error);
 

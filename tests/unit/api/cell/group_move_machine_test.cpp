@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
+#include <limits>
 #include <string>
 #include <utility>
 #include <vector>
@@ -65,6 +66,12 @@ class Bench {
             .move = part(machine, state),
             .clock = (sent + trip / 2).time_since_epoch() + offset(machine)};
   }
+  /// Of a part that another entrance has told.
+  [[nodiscard]] GroupMoveMachine::Answer foreign(std::size_t machine, axisd::v1::CommandState state) {
+    auto made = answer(machine, state);
+    made.move.mutable_preparation()->mutable_starts_at()->set_seconds(7);
+    return made;
+  }
   [[nodiscard]] GroupMoveMachine::Answer failure(grpc::Status status) const {
     return {.sent = now, .received = now, .status = std::move(status)};
   }
@@ -116,6 +123,15 @@ class Bench {
     add(move.looked(machine, answer(machine, state)));
   }
 
+  /// Those that wait for their moment say so when they are looked at, and are stopped then.
+  void release_waiting(const std::vector<std::size_t>& machines) {
+    EXPECT_THAT(asked(Kind::cancel), IsEmpty()) << "another entrance may have told them since";
+    EXPECT_EQ(asked(Kind::look), machines);
+    for (const auto machine : machines) end(machine, COMMAND_STATE_ACCEPTED);
+    EXPECT_EQ(asked(Kind::cancel), machines);
+    for (const auto machine : machines) end(machine, COMMAND_STATE_ABORTED);
+  }
+
   const std::size_t count;
   TimePoint now{100s};
   Duration expires = 102s, trip = 200us;
@@ -153,6 +169,22 @@ TEST(GroupMoveMachine, EachIsPreparedMeasuredToldAndRenewed) {
   EXPECT_EQ(bench.asked(Kind::renew), (std::vector<std::size_t>{0, 1, 2}));
 }
 
+/// While it runs they do not tell their members, which are stopped by their commands all the same.
+TEST(GroupMoveMachine, MembersAreKnownFromThePreparation) {
+  Bench bench;
+  bench.run_up_to(State::running);
+  for (std::size_t i = 0; i < 3; ++i) {
+    auto answer = bench.answer(i, COMMAND_STATE_ACTIVE);
+    answer.move.clear_members();
+    bench.add(bench.move.renewed(i, answer));
+    EXPECT_THAT(bench.move.commands_at(i), ::testing::ElementsAre("c-" + std::to_string(i)));
+  }
+  for (const auto& part : bench.move.value().machines()) {
+    ASSERT_EQ(part.move().members_size(), 1);
+    EXPECT_EQ(part.move().members(0).command().state(), COMMAND_STATE_ACTIVE);
+  }
+}
+
 TEST(GroupMoveMachine, ItIsDoneWhenAllAre) {
   Bench bench;
   bench.run_up_to(State::running);
@@ -172,13 +204,11 @@ TEST(GroupMoveMachine, WhatForbidsOneForbidsAll) {
   Bench bench;
   bench.add(bench.move.prepared(0, bench.answer(0, COMMAND_STATE_ACCEPTED)));
   bench.add(bench.move.prepared(1, bench.failure(refusal())));
-  EXPECT_EQ(bench.move.state(), State::giving_up);
-  EXPECT_EQ(bench.asked(Kind::cancel), (std::vector<std::size_t>{0}));
+  EXPECT_EQ(bench.move.state(), State::preparing) << "the last one may be told already, by another entrance";
   bench.add(bench.move.prepared(2, bench.answer(2, COMMAND_STATE_ACCEPTED)));
-  EXPECT_EQ(bench.asked(Kind::cancel), (std::vector<std::size_t>{2})) << "it was prepared after that";
+  EXPECT_EQ(bench.move.state(), State::giving_up);
   EXPECT_FALSE(bench.move.reached(axisd::v1::WAIT_UNTIL_ACCEPTED));
-  bench.end(0, COMMAND_STATE_ABORTED);
-  bench.end(2, COMMAND_STATE_ABORTED);
+  bench.release_waiting({0, 2});
   EXPECT_EQ(bench.move.state(), State::over);
   EXPECT_EQ(bench.move.refusal().error_code(), grpc::StatusCode::FAILED_PRECONDITION);
   EXPECT_THAT(bench.move.refusal().error_message(), HasSubstr("press-2: feeder: no"));
@@ -201,8 +231,13 @@ TEST(GroupMoveMachine, WhereverItIsWhoIsLostOrFailsStopsTheOthers) {
       EXPECT_EQ(bench.move.state(), State::giving_up);
       EXPECT_THAT(bench.move.value().cause().message(),
                   HasSubstr(lost ? "press-2: no route" : "press-2: arm: alarm 7"));
-      auto stopped = bench.asked(Kind::cancel);
-      EXPECT_EQ(stopped, lost ? (std::vector<std::size_t>{0, 1, 2}) : (std::vector<std::size_t>{0, 2}));
+      const auto left = lost ? (std::vector<std::size_t>{0, 1, 2}) : (std::vector<std::size_t>{0, 2});
+      if (state != State::running) {
+        EXPECT_THAT(bench.asked(Kind::cancel), IsEmpty()) << "whoever waits starts nothing";
+        EXPECT_EQ(bench.asked(Kind::look), left);
+        for (const auto machine : left) bench.end(machine, COMMAND_STATE_ACCEPTED);
+      }
+      EXPECT_EQ(bench.asked(Kind::cancel), left);
       EXPECT_EQ(bench.move.refusal().ok(), state != State::measuring);
       bench.take(Kind::renew);
       bench.pass(GroupMoveMachine::renewal_period);
@@ -259,7 +294,8 @@ TEST(GroupMoveMachine, AClockThatIsNotKnownWellEnoughIsRefused) {
   EXPECT_EQ(bench.move.state(), State::giving_up);
   EXPECT_THAT(bench.move.value().cause().message(),
               HasSubstr("press-1: its clock is known to 0.150 ms only"));
-  EXPECT_EQ(bench.asked(Kind::cancel), (std::vector<std::size_t>{0, 1}));
+  bench.release_waiting({0, 1});
+  EXPECT_EQ(bench.move.refusal().error_code(), grpc::StatusCode::OUT_OF_RANGE);
   EXPECT_THAT(bench.take(Kind::tell), IsEmpty());
 }
 
@@ -282,11 +318,12 @@ TEST(GroupMoveMachine, WhereNotAllAreToldInTimeNobodyStarts) {
   for (const auto& errand : bench.take(Kind::renew)) EXPECT_FALSE(errand.all_told);
   bench.pass(60ms);
   EXPECT_EQ(bench.move.state(), State::giving_up);
-  EXPECT_EQ(bench.asked(Kind::cancel), (std::vector<std::size_t>{0, 1, 2}));
+  EXPECT_EQ(bench.asked(Kind::cancel), (std::vector<std::size_t>{0}));
   EXPECT_THAT(bench.take(Kind::renew), IsEmpty());
   // What is under way changes nothing.
   bench.add(bench.move.told(1, bench.answer(1, COMMAND_STATE_ACCEPTED)));
   EXPECT_EQ(bench.move.state(), State::giving_up);
+  EXPECT_EQ(bench.asked(Kind::cancel), (std::vector<std::size_t>{1}));
   EXPECT_THAT(bench.take(Kind::renew), IsEmpty());
 }
 
@@ -299,9 +336,8 @@ TEST(GroupMoveMachine, WhatAnotherEntranceDoesIsOnlyLookedAt) {
     if (state == State::preparing) {
       bench.take(Kind::prepare);
       for (std::size_t i = 0; i < 3; ++i) {
-        auto answer = bench.answer(i, COMMAND_STATE_ACCEPTED);
-        if (i == 1) answer.move.mutable_preparation()->mutable_starts_at()->set_seconds(7);
-        bench.add(bench.move.prepared(i, answer));
+        bench.add(bench.move.prepared(
+            i, i == 1 ? bench.foreign(i, COMMAND_STATE_ACCEPTED) : bench.answer(i, COMMAND_STATE_ACCEPTED)));
       }
     } else {
       bench.take(Kind::tell);
@@ -345,16 +381,98 @@ TEST(GroupMoveMachine, ARequestThatHasEndedIsToldAsItEnded) {
   }
 }
 
-/// One entrance is gone after it asked press-1, whose part has expired since.
-TEST(GroupMoveMachine, ARequestThatHasEndedInPartIsRefused) {
+/// One entrance was gone after it asked press-1, whose part has ended since: in motion, for all that is
+/// known.
+TEST(GroupMoveMachine, ARequestThatHasEndedInPartIsToldAsItEnded) {
   Bench bench;
   bench.take(Kind::prepare);
   for (std::size_t i = 0; i < 3; ++i)
     bench.add(
         bench.move.prepared(i, bench.answer(i, i == 0 ? COMMAND_STATE_ABORTED : COMMAND_STATE_ACCEPTED)));
   EXPECT_EQ(bench.move.state(), State::giving_up);
-  EXPECT_EQ(bench.asked(Kind::cancel), (std::vector<std::size_t>{1, 2}));
-  EXPECT_THAT(bench.move.refusal().error_message(), HasSubstr("press-1: arm: alarm 7"));
+  bench.release_waiting({1, 2});
+  EXPECT_EQ(bench.move.state(), State::over);
+  EXPECT_TRUE(bench.move.refusal().ok()) << "no refusal: something has moved, perhaps";
+  EXPECT_EQ(bench.move.value().state(), COMMAND_STATE_ABORTED);
+  EXPECT_THAT(bench.move.value().cause().message(), HasSubstr("press-1: arm: alarm 7"));
+}
+
+/// A repeat while the others run, or after they did: that one refuses it says nothing of them.
+TEST(GroupMoveMachine, AMachineThatRefusesARepeatDoesNotHideWhatTheOthersDid) {
+  for (const bool ended : {false, true}) {
+    Bench bench;
+    bench.take(Kind::prepare);
+    bench.add(bench.move.prepared(0, bench.failure({grpc::StatusCode::UNAVAILABLE, "no route"})));
+    for (const std::size_t i : {1U, 2U})
+      bench.add(bench.move.prepared(
+          i, ended ? bench.answer(i, COMMAND_STATE_DONE) : bench.foreign(i, COMMAND_STATE_ACTIVE)));
+    EXPECT_EQ(bench.move.state(), ended ? State::over : State::attached);
+    EXPECT_THAT(bench.wire, IsEmpty()) << "nobody is stopped";
+    if (!ended)
+      for (const std::size_t i : {1U, 2U}) bench.end(i, COMMAND_STATE_DONE);
+    EXPECT_EQ(bench.move.state(), State::over);
+    EXPECT_TRUE(bench.move.refusal().ok());
+    EXPECT_EQ(bench.move.value().state(), COMMAND_STATE_UNKNOWN);
+    EXPECT_THAT(bench.move.value().cause().message(), HasSubstr("press-1: no route"));
+  }
+}
+
+/// Two entrances have prepared the same request, and the other one is faster.
+TEST(GroupMoveMachine, WhatAnotherEntranceTellsMeanwhileIsNotStopped) {
+  for (const auto state : {COMMAND_STATE_ACCEPTED, COMMAND_STATE_ACTIVE}) {
+    Bench bench;
+    bench.run_up_to(State::measuring);
+    bench.take(Kind::measure);
+    bench.add(bench.move.measured(0, bench.foreign(0, state)));
+    EXPECT_EQ(bench.move.state(), State::attached);
+    bench.add(bench.move.measured(1, bench.failure({grpc::StatusCode::UNAVAILABLE, "a slow link"})));
+    EXPECT_EQ(bench.move.state(), State::attached);
+    EXPECT_THAT(bench.wire, IsEmpty());
+    for (std::size_t i = 0; i < 3; ++i) {
+      auto done = bench.foreign(i, COMMAND_STATE_DONE);
+      bench.add(bench.move.looked(i, done));
+    }
+    EXPECT_EQ(bench.move.value().state(), COMMAND_STATE_DONE);
+    EXPECT_TRUE(bench.move.refusal().ok());
+  }
+}
+
+/// This entrance gives up before it has seen that the other one has told them.
+TEST(GroupMoveMachine, WhoeverWaitsIsStoppedOnlyIfNobodyElseHasToldIt) {
+  for (const auto state : {State::measuring, State::telling}) {
+    SCOPED_TRACE(static_cast<int>(state));
+    Bench bench;
+    bench.run_up_to(state);
+    const auto slow = bench.failure({grpc::StatusCode::DEADLINE_EXCEEDED, "a slow link"});
+    bench.add(state == State::measuring ? bench.move.measured(1, slow) : bench.move.told(1, slow));
+    ASSERT_EQ(bench.move.state(), State::giving_up);
+    EXPECT_THAT(bench.asked(Kind::cancel), IsEmpty());
+    bench.add(bench.move.looked(0, bench.foreign(0, COMMAND_STATE_ACTIVE)));
+    EXPECT_EQ(bench.move.state(), State::attached);
+    bench.take(Kind::look);
+    bench.take(Kind::measure);
+    bench.take(Kind::tell);
+    EXPECT_THAT(bench.wire, IsEmpty());
+    for (std::size_t i = 0; i < 3; ++i) bench.add(bench.move.looked(i, bench.foreign(i, COMMAND_STATE_DONE)));
+    EXPECT_EQ(bench.move.state(), State::over);
+    EXPECT_TRUE(bench.move.refusal().ok());
+    EXPECT_EQ(bench.move.value().state(), COMMAND_STATE_DONE);
+    EXPECT_THAT(bench.asked(Kind::cancel), IsEmpty());
+  }
+}
+
+/// Its answer to the telling was lost: by its moment it is this entrance's, and is stopped.
+TEST(GroupMoveMachine, WhatHasThisEntrancesMomentIsStopped) {
+  Bench bench;
+  bench.run_up_to(State::telling);
+  const auto at = bench.take(Kind::tell)[0].at;
+  bench.add(bench.move.told(1, bench.failure({grpc::StatusCode::DEADLINE_EXCEEDED, "a slow link"})));
+  EXPECT_EQ(bench.asked(Kind::look), (std::vector<std::size_t>{0, 1, 2}));
+  auto answer = bench.answer(0, COMMAND_STATE_ACCEPTED);
+  set_duration(*answer.move.mutable_preparation()->mutable_starts_at(), at);
+  bench.add(bench.move.looked(0, answer));
+  EXPECT_EQ(bench.move.state(), State::giving_up);
+  EXPECT_EQ(bench.asked(Kind::cancel), (std::vector<std::size_t>{0}));
 }
 
 TEST(GroupMoveMachine, ASkewIsToldWithItsBound) {
@@ -381,6 +499,59 @@ TEST(GroupMoveMachine, ASkewIsToldWithItsBound) {
   EXPECT_LE(std::abs(ns(move.machines(2).started_after()) - 4'000'000), bound);
   EXPECT_LE(std::abs(ns(move.machines(1).clock_offset()) - 7'200'000'000'000),
             ns(move.machines(1).clock_error()));
+}
+
+/// Clocks drift apart: the samples near the start are the ones that count, however long the move then lasts.
+TEST(GroupMoveMachine, ALongMoveKeepsTheSkewOfItsStart) {
+  Bench bench(2);
+  bench.run_up_to(State::running);
+  const auto first = bench.now + 300ms;
+  bench.now = first + 100ms;
+  const auto renew = [&](axisd::v1::CommandState state) {
+    for (std::size_t i = 0; i < bench.count; ++i) {
+      auto answer = bench.answer(i, state);
+      set_duration(*answer.move.mutable_preparation()->mutable_first_start(),
+                   first.time_since_epoch() + bench.offset(i));
+      set_duration(*answer.move.mutable_start_skew(), Duration{});
+      bench.add(bench.move.renewed(i, answer));
+    }
+  };
+  for (int i = 0; i < 400; ++i) {
+    renew(COMMAND_STATE_ACTIVE);
+    bench.now += GroupMoveMachine::renewal_period;
+  }
+  renew(COMMAND_STATE_DONE);
+  EXPECT_EQ(bench.move.state(), State::over);
+  EXPECT_LT(duration_of(bench.move.value().start_skew_error()), 500us);
+}
+
+/// Whatever a machine answers.
+TEST(GroupMoveMachine, TimesThatNoClockShowsEndTheMove) {
+  for (const auto seconds :
+       {std::numeric_limits<std::int64_t>::max(), std::numeric_limits<std::int64_t>::min()}) {
+    google::protobuf::Duration from;
+    from.set_seconds(seconds);
+    from.set_nanos(seconds < 0 ? std::numeric_limits<std::int32_t>::min()
+                               : std::numeric_limits<std::int32_t>::max());
+    EXPECT_LT(std::chrono::abs(duration_of(from)), std::chrono::years(31));
+  }
+  Bench bench;
+  bench.take(Kind::prepare);
+  for (std::size_t i = 0; i < 3; ++i) {
+    auto answer = bench.answer(i, COMMAND_STATE_ACCEPTED);
+    answer.move.mutable_preparation()->mutable_notice()->set_seconds(
+        std::numeric_limits<std::int64_t>::max());
+    bench.add(bench.move.prepared(i, answer));
+  }
+  for (auto errands = bench.take(Kind::measure); !errands.empty(); errands = bench.take(Kind::measure))
+    for (const auto& errand : errands) {
+      auto answer = bench.answer(errand.machine, COMMAND_STATE_ACCEPTED);
+      answer.move.mutable_preparation()->mutable_notice()->set_seconds(
+          std::numeric_limits<std::int64_t>::max());
+      bench.add(bench.move.measured(errand.machine, answer));
+    }
+  EXPECT_EQ(bench.move.state(), State::giving_up);
+  EXPECT_EQ(bench.move.value().cause().reason(), axisd::v1::REASON_EXPIRED);
 }
 
 TEST(GroupMoveMachine, WhoWaitsForTheStartWaitsForAll) {
