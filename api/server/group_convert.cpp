@@ -100,11 +100,20 @@ void to_proto(const GroupPreparation& from, v1::Preparation& to) {
   if (from.first_start) to_proto(*from.first_start, *to.mutable_first_start());
 }
 
-void to_proto(const GroupMove& from, v1::GroupMove& to) {
+void to_proto_without_members(const GroupMove& from, v1::GroupMove& to) {
   to.set_id(from.id);
   to.set_group(from.group);
   to.set_state(to_proto(from.state));
   if (from.cause) to_proto(*from.cause, *to.mutable_cause());
+  to.set_arrive_together(from.arrive_together);
+  to_proto(from.predicted_arrival_error, *to.mutable_predicted_arrival_error());
+  if (from.start_skew) to_proto(*from.start_skew, *to.mutable_start_skew());
+  if (from.arrival_error) to_proto(*from.arrival_error, *to.mutable_arrival_error());
+  if (from.preparation) to_proto(*from.preparation, *to.mutable_preparation());
+}
+
+void to_proto(const GroupMove& from, v1::GroupMove& to) {
+  to_proto_without_members(from, to);
   for (const auto& member : from.members) {
     auto& entry = *to.add_members();
     to_proto(member.command, *entry.mutable_command());
@@ -114,11 +123,6 @@ void to_proto(const GroupMove& from, v1::GroupMove& to) {
     if (member.started_after) to_proto(*member.started_after, *entry.mutable_started_after());
     if (member.arrived_after) to_proto(*member.arrived_after, *entry.mutable_arrived_after());
   }
-  to.set_arrive_together(from.arrive_together);
-  to_proto(from.predicted_arrival_error, *to.mutable_predicted_arrival_error());
-  if (from.start_skew) to_proto(*from.start_skew, *to.mutable_start_skew());
-  if (from.arrival_error) to_proto(*from.arrival_error, *to.mutable_arrival_error());
-  if (from.preparation) to_proto(*from.preparation, *to.mutable_preparation());
 }
 
 void to_proto(const GroupStopResult& from, v1::GroupStopResult& to) {

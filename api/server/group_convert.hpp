@@ -18,6 +18,7 @@ void to_proto(TimePoint from, google::protobuf::Duration& to);
 [[nodiscard]] Error nothing_named();
 void to_proto(const GroupSettings& from, v1::Group& to);
 void to_proto(const GroupPreparation& from, v1::Preparation& to);
+void to_proto_without_members(const GroupMove& from, v1::GroupMove& to);
 void to_proto(const GroupMove& from, v1::GroupMove& to);
 void to_proto(const GroupStopResult& from, v1::GroupStopResult& to);
 void to_proto(const GroupReleaseResult& from, v1::GroupReleaseStopResult& to);

@@ -172,7 +172,11 @@ void handle(Machine& machine, const v1::RenewPreparedRequest& request, const Cal
   machine.group_access().renew(
       request.id(), caller.name, request.all_told() ? GroupRenewal::all_told : GroupRenewal::waits,
       reply_with_value<GroupMove>(reply, [response, &machine](const GroupMove& move) {
-        to_proto(move, *response->mutable_move());
+        // Asked for several times a second, beside stops: members are many.
+        if (ended(move.state))
+          to_proto(move, *response->mutable_move());
+        else
+          to_proto_without_members(move, *response->mutable_move());
         to_proto(machine.now(), *response->mutable_clock());
       }));
 }

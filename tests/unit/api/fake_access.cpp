@@ -347,7 +347,10 @@ void FakeGroups::start(GroupStartRequest request, WaitUntil until,
 void FakeGroups::renew(std::string id, std::string client, GroupRenewal renewal,
                        std::function<void(Result<GroupMove>)> callback) {
   note(fmt::format("renew {} by {}{}", id, client, renewal == GroupRenewal::all_told ? ", all told" : ""));
-  answer<GroupMove>(callback, GroupMove{.id = id});
+  const auto state = id == "g-done" ? CommandState::done : CommandState::active;
+  answer<GroupMove>(
+      callback,
+      GroupMove{.id = id, .state = state, .members = {{.command = {.axis = "feeder"}}}, .preparation = {{}}});
 }
 
 void FakeGroups::get(std::string id, std::function<void(Result<GroupMove>)> callback) {

@@ -115,11 +115,19 @@ TEST_F(GroupCalls, APreparedMoveIsStartedAndRenewedByItsId) {
   v1::RenewPreparedResponse renewed;
   ASSERT_TRUE(groups_->RenewPrepared(&third, renew, &renewed).ok());
   EXPECT_EQ(renewed.move().id(), "g-1");
+  EXPECT_TRUE(renewed.move().has_preparation());
+  EXPECT_TRUE(renewed.move().members().empty()) << "they are told once it has ended";
   EXPECT_TRUE(renewed.has_clock());
+
+  Call fourth;
+  renew.set_id("g-done");
+  ASSERT_TRUE(groups_->RenewPrepared(&fourth, renew, &renewed).ok());
+  EXPECT_EQ(renewed.move().members_size(), 1);
   EXPECT_THAT(machine_.groups().log(),
               ElementsAre("prepare  feeder=0 together false within -1 by " + own_name() + " as r-1 until 0",
                           "start g-1 at 8500 by " + own_name() + " until 1",
-                          "renew g-1 by " + own_name() + ", all told"));
+                          "renew g-1 by " + own_name() + ", all told",
+                          "renew g-done by " + own_name() + ", all told"));
 }
 
 TEST_F(GroupCalls, MalformedPreparationsAreRefusedHere) {
