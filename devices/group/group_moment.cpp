@@ -18,6 +18,8 @@ constexpr auto examination_reserve = std::chrono::milliseconds(30);
 /// ends in between.
 constexpr auto hold_reserve = std::chrono::milliseconds(20),
                verification_reserve = std::chrono::milliseconds(5);
+/// Others at rest are not read meanwhile: on a slow line the verification begins before the hold.
+constexpr Duration longest_hold = std::chrono::milliseconds(80);
 /// Some answers to SDOs of each member, side by side.
 constexpr Duration longest_sync_approach = std::chrono::milliseconds(20);
 /// Of a start that follows another one.
@@ -93,9 +95,10 @@ Task<GroupRun::MaybeFailure> GroupRun::await_moment() {
 /// Its bus is free at the moment, and what its start rests on is fresh then.
 Task<GroupRun::MaybeFailure> GroupRun::approach(std::size_t first) {
   const auto at = *preparation_->starts_at;
-  co_await pause_until(at - 2 * verifying_ - hold_reserve);
-  if (given_up()) co_return std::nullopt;
-  hold_ = members_[first]->hold_bus();
+  const auto held_from = at - std::min(2 * verifying_, longest_hold) - hold_reserve;
+  const auto hold = parts_.clock->call_at(held_from, [this, first] {
+    if (!given_up()) hold_ = members_[first]->hold_bus();
+  });
   co_await pause_until(at - verifying_ * 5 / 4 - verification_reserve);
   if (given_up()) co_return std::nullopt;
   if (const auto verified = co_await members_[first]->verify(); !verified)

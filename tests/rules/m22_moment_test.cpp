@@ -102,6 +102,26 @@ TEST(M22Moment, TheLineIsFreeAtTheMoment) {
       }
 }
 
+/// Where the verification takes long: others at rest are read until it begins.
+TEST(M22Moment, ASlowLineIsHeldBrieflyToo) {
+  MomentRig rig({.baud = 9600, .more_serial_axes = 4});
+  const auto run = rig.prepare({{"x", 50}});
+  rig.line->forget_wire();
+  const auto at = rig.tell(run, 900ms);
+  rig.keep(run, 1100ms);
+  ASSERT_EQ(rig.start_frames().size(), 1U) << cause_of(run);
+  const auto start = rig.start_frames().front();
+  EXPECT_LE(start - at, 1ms);
+  auto last_of_others = TimePoint{}, first_after = TimePoint::max();
+  for (const auto& entry : rig.line->wire()) {
+    if (entry.node() == 1) continue;
+    if (entry.begin < start) last_of_others = entry.begin;
+    if (entry.begin > start) first_after = std::min(first_after, entry.begin);
+  }
+  EXPECT_GE(last_of_others - at, -190ms);
+  EXPECT_LE(first_after - at, 300ms) << "the line is let go";
+}
+
 /// M31: by how much the first start may be late, whatever holds it up.
 TEST(M22Moment, WhatCannotBeInTimeDoesNotStart) {
   {
