@@ -15,6 +15,8 @@ namespace {
 /// So long before the moment of the SYNC the first node is armed, and so much longer for each: one frame
 /// takes less, down to 125 kbit/s.
 constexpr auto arming_time = std::chrono::milliseconds(2), arming_of_one = std::chrono::milliseconds(1);
+/// Before that cycles are held: one that is on its way ends within this.
+constexpr auto hold_time = std::chrono::milliseconds(2);
 
 /// What must not change between the first frame that arms a node and the end of the SYNC.
 struct Surroundings {
@@ -30,8 +32,10 @@ class CommonStart {
       : bus_(&bus), members_(std::move(members)), not_before_(not_before) {}
 
   Task<Result<TimePoint>> run() {
+    const auto armed_from = not_before_ - arming_time - arming_of_one * members_.size();
+    co_await pause_until(armed_from - hold_time);
     const auto hold = co_await bus_->hold_sync();
-    co_await pause_until(not_before_ - arming_time - arming_of_one * members_.size());
+    co_await pause_until(armed_from);
     if (auto objection = bus_->objection_to_sync()) co_return fail(std::move(*objection));
     before_ = surroundings();
     foreign_syncs_ = bus_->master().counters().foreign_syncs;

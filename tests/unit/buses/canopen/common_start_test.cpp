@@ -121,12 +121,25 @@ TEST(CommonStart, TheSyncComesAtItsMomentAndNodesAreArmedShortlyBefore) {
   start.not_before = start.world.now() + 43ms;
   start.launch();
   start.world.run_for(36ms);
-  EXPECT_TRUE(start.port->log.empty()) << "cycles are held";
+  EXPECT_THAT(start.port->log, ElementsAre("080#", "080#", "080#", "080#")) << "cycles go on until then";
+  start.port->log.clear();
+  start.port->times.clear();
   const auto at = start.finish();
   ASSERT_TRUE(at);
   EXPECT_THAT(start.port->log, ElementsAre("305#1F00", "306#1F00", "080#"));
   EXPECT_EQ(*at, start.not_before + 100us) << "the frame takes its time";
   EXPECT_GE(start.port->times.front(), start.not_before - 5ms);
+}
+
+TEST(CommonStart, NoCycleComesBetweenArmingAndTheMoment) {
+  Start start(10ms);
+  start.world.run_for(25ms);
+  start.not_before = start.world.now() + 47ms;  // a cycle would come 2 ms before
+  start.launch();
+  start.world.run_for(36ms);
+  start.port->log.clear();
+  ASSERT_TRUE(start.finish());
+  EXPECT_THAT(start.port->log, ElementsAre("305#1F00", "306#1F00", "080#"));
 }
 
 TEST(CommonStart, AStopBetweenArmingAndTheMomentStartsNobody) {
