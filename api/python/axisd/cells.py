@@ -100,10 +100,12 @@ class Cell:
                    deceleration_time: Seconds | None = None, clock_tolerance: Seconds | None = None,
                    lease: CellLease | None = None, wait: bool = True, request_id: str | None = None) -> CellMove:
         """Moves axes of several machines from one moment on, to positions (or by distances) by their names:
-        {"press-1/feeder": 100, "press-2/arm": 90}. All of them start, or none; whatever fails at one stops all, and they
-        stop within half a second where the entrance is gone. Waits until all have ended, unless `wait` is False. `lease`:
+        {"press-1/feeder": 100, "press-2/arm": 90}. What forbids one to start forbids it to all. Whatever fails at one stops
+        the others, some 0.2 s later; where a machine does not answer, 0.65 s later. Where the entrance is gone, each
+        machine begins to stop its axes after half a second. Waits until all have ended, unless `wait` is False. `lease`:
         the one under which it moves. `clock_tolerance`: refused where a machine's clock is known less well (1 ms).
-        Raises as Group.move()."""
+        Raises as Group.move(); where the entrance is shut down meanwhile, UnreachableError: repeat it with the same
+        `request_id` through another one."""
         request = request_of(targets, relative, velocity or {}, acceleration_time, deceleration_time, clock_tolerance,
                              lease, wait, request_id)
         response = await self._entrance._call(self._cell.MoveGroup, request, ", ".join(sorted(targets)), wait)
