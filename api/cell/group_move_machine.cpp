@@ -67,8 +67,10 @@ void GroupMoveMachine::take(Part& part, const axisd::v1::GroupMove& move) {
   const bool elsewhere =
       was_told(move) &&
       (!part.at || (preparation.has_starts_at() && duration_of(preparation.starts_at()) != *part.at));
-  if (was_told(move)) may_have_started_ = true;
-  if (elsewhere) part.stage = Part::Stage::foreign;
+  if (elsewhere) {
+    may_have_started_ = true;
+    part.stage = Part::Stage::foreign;
+  }
   if (has_ended(move.state())) part.stage = Part::Stage::ended;
   if (elsewhere && state_ != State::preparing) attach();
 }
@@ -175,13 +177,13 @@ GroupMoveMachine::Errands GroupMoveMachine::choose_moment(TimePoint now) {
 GroupMoveMachine::Errands GroupMoveMachine::told(std::size_t machine, const Answer& answer) {
   Errands errands;
   auto& part = parts_[machine];
-  if (state_ == State::giving_up) return take_while_giving_up(machine, answer);
-  if (state_ != State::telling) return errands;
+  if (is_out(part) || (state_ != State::telling && state_ != State::giving_up)) return errands;
   if (!answer.status.ok() && detail_of(answer.status).reason() == axisd::v1::REASON_REQUEST_ID_CONFLICT) {
     part.stage = Part::Stage::foreign;
     attach();
     return errands;
   }
+  if (state_ == State::giving_up) return take_while_giving_up(machine, answer);
   if (!goes_on(machine, answer, errands)) return errands;
   if (part.stage == Part::Stage::prepared) part.stage = Part::Stage::told;
   part.next = answer.received + renewal_period;
@@ -194,6 +196,7 @@ GroupMoveMachine::Errands GroupMoveMachine::told(std::size_t machine, const Answ
     errands.push_back({.kind = Errand::Kind::renew, .machine = i, .all_told = true});
     parts_[i].next = answer.received + renewal_period;
   }
+  if (all(Part::Stage::ended)) end();
   return errands;
 }
 
@@ -240,7 +243,7 @@ GroupMoveMachine::Errands GroupMoveMachine::take_while_giving_up(std::size_t mac
   if (is_out(part)) return errands;
   if (answer.status.ok()) {
     take(part, answer.move);
-    if (state_ == State::giving_up) stop_part(machine, errands);
+    if (state_ == State::giving_up && was_told(part.move)) stop_part(machine, errands);
   } else if (detail_of(answer.status).reason() == axisd::v1::REASON_UNKNOWN_COMMAND) {
     part.error = detail_of(answer.status);  // its axisd was started anew, which starts nothing
     part.stage = Part::Stage::ended;
@@ -295,7 +298,12 @@ void GroupMoveMachine::end_part(std::size_t machine, TimePoint now, Errands& err
   auto& part = parts_[machine];
   if (is_out(part)) return;
   part.next = now + look_period;
-  if (part.stage == Part::Stage::told) stop_part(machine, errands);
+  if (part.stage == Part::Stage::told || was_told(part.move)) {
+    stop_part(machine, errands);
+  } else {
+    if (!part.at) part.at = duration_of(part.move.preparation().expires());
+    errands.push_back({.kind = Errand::Kind::tell, .machine = machine, .at = *part.at});
+  }
   errands.push_back({.kind = Errand::Kind::look, .machine = machine});
 }
 

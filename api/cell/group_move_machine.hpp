@@ -35,8 +35,10 @@ namespace axisd::cell {
 ///            ---- another entrance has told one, for the same request -----> attached
 ///
 /// What one refuses or does not answer while it is prepared is judged once all have answered: another
-/// entrance may have told one of the others. Only `giving_up` stops anybody: at once whom this entrance has
-/// told; whoever waits for a moment, once it has said that nobody else has told it. Thread: core.
+/// entrance may have told one of the others. Only `giving_up` stops anybody, and only what has the moment of
+/// this entrance. Whoever waits for a moment is told one first, that is never said to be everybody's: where
+/// it takes that, no other entrance can start it any more; where it does not, another one has told it.
+/// Thread: core.
 class GroupMoveMachine {
  public:
   enum class State : std::uint8_t {
@@ -140,7 +142,7 @@ class GroupMoveMachine {
   [[nodiscard]] Errands fail(std::size_t machine, const grpc::Status& status, TimePoint now);
   /// Of an answer of any kind, while all are stopped.
   [[nodiscard]] Errands take_while_giving_up(std::size_t machine, const Answer& answer);
-  /// One that has not ended is stopped if this entrance has told it, and looked at.
+  /// One that has not ended is stopped if it has the moment of this entrance, else told one; and looked at.
   void end_part(std::size_t machine, TimePoint now, Errands& errands);
   void stop_part(std::size_t machine, Errands& errands);
   void end_if_over();
