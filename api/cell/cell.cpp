@@ -360,6 +360,8 @@ Reading Cell::reading() const {
   reading.told_again = stop_all_.told_again();
   reading.durable = !stop_all_.not_durable();
   reading.open_calls = calls_.open();
+  reading.open_moves = group_moves_.open();
+  reading.moves = group_moves_.tally();
   reading.refused = routes_.refused.load(std::memory_order_relaxed);
   reading.too_many = routes_.too_many.load(std::memory_order_relaxed);
   reading.durations = routes_.durations();

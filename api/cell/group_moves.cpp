@@ -230,12 +230,23 @@ void GroupMoves::tick(const RunPtr& run) {
   });
 }
 
-/// Whoever waits hears what they wait for; what is over needs neither connections nor its request.
-void GroupMoves::settle(const RunPtr& run) {
-  if (run->over()) {
-    run->ways.clear();
-    run->request.Clear();
+/// It needs neither connections nor its request any more.
+void GroupMoves::close(Run& run) {
+  run.ways.clear();
+  run.request.Clear();
+  if (!run.machine.refusal().ok()) {
+    ++tally_.refused;
+    return;
   }
+  const auto state = run.machine.value().state();
+  ++(state == axisd::v1::COMMAND_STATE_DONE      ? tally_.done
+     : state == axisd::v1::COMMAND_STATE_UNKNOWN ? tally_.unknown
+                                                 : tally_.otherwise);
+}
+
+/// Whoever waits hears what they wait for.
+void GroupMoves::settle(const RunPtr& run) {
+  if (run->over() && !run->ways.empty()) close(*run);
   auto& waiters = run->waiters;
   for (auto waiter = waiters.begin(); waiter != waiters.end();) {
     if (!run->machine.reached(waiter->until)) {

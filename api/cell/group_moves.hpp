@@ -35,6 +35,14 @@ class GroupMoves {
   void end(const grpc::Status& why);
   /// That have not ended.
   [[nodiscard]] int open() const;
+  /// How many ended how, as this entrance knows it.
+  struct Tally {
+    std::uint64_t done = 0;
+    std::uint64_t otherwise = 0;  ///< aborted, or failed
+    std::uint64_t unknown = 0;    ///< a machine did not say what became of it
+    std::uint64_t refused = 0;    ///< this entrance has started nothing
+  };
+  [[nodiscard]] const Tally& tally() const { return tally_; }
 
   /// Of one client, and of all, that have not ended.
   static constexpr int most_of_one = 8, most = 64;
@@ -66,12 +74,14 @@ class GroupMoves {
   auto taker(const RunPtr& run, std::size_t machine, Event event);
   void tick(const RunPtr& run);
   void settle(const RunPtr& run);
+  void close(Run& run);
   void forget_oldest();
 
   boost::asio::any_io_executor core_;
   Clock& clock_;
   const RouteTable& routes_;
   std::list<RunPtr> runs_;  ///< oldest first
+  Tally tally_;
 };
 
 }  // namespace axisd::cell

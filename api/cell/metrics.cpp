@@ -66,6 +66,18 @@ void write_cell(Exposition& to, const Reading& reading) {
   to.sample({}, reading.told_again);
 }
 
+void write_moves(Exposition& to, const Reading& reading) {
+  to.family("axisd_cell_group_moves_open", MetricType::gauge,
+            "Moves of several machines that this entrance coordinates, or looks at.");
+  to.sample({}, reading.open_moves);
+  to.family("axisd_cell_group_moves_total", MetricType::counter,
+            "Moves of several machines, by how they ended.");
+  to.sample(Labels().with("result", "done"), reading.moves.done);
+  to.sample(Labels().with("result", "ended_otherwise"), reading.moves.otherwise);
+  to.sample(Labels().with("result", "unknown"), reading.moves.unknown);
+  to.sample(Labels().with("result", "refused"), reading.moves.refused);
+}
+
 void write_calls(Exposition& to, const Reading& reading) {
   to.family("axisd_cell_calls_open", MetricType::gauge, "Calls that are open, streams too.");
   to.sample({}, reading.open_calls);
@@ -101,6 +113,7 @@ std::string render(const Reading& reading, metrics::Format format) {
   Exposition to(format);
   write_cell(to, reading);
   write_machines(to, reading);
+  write_moves(to, reading);
   write_calls(to, reading);
   return to.take();
 }

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "api/cell/group_moves.hpp"
 #include "api/cell/routes.hpp"
 #include "api/exposition/exposition.hpp"
 #include "axisd/cell/v1/cell_service.pb.h"
@@ -33,6 +34,8 @@ struct Reading {
   std::size_t stops_standing = 0;
   bool durable = true;
   int open_calls = 0;
+  int open_moves = 0;
+  GroupMoves::Tally moves;  ///< of several machines
   LatencyHistogram durations;
 };
 

@@ -6,6 +6,7 @@
 #include <grpcpp/server.h>
 #include <grpcpp/server_builder.h>
 
+#include <atomic>
 #include <boost/asio/io_context.hpp>
 #include <limits>
 #include <memory>
@@ -26,6 +27,10 @@ using ::testing::HasSubstr;
 
 /// An axisd at which every request is a move that another entrance has started.
 class Moving final : public axisd::v1::GroupService::Service {
+ public:
+  std::atomic<axisd::v1::CommandState> state = axisd::v1::COMMAND_STATE_ACTIVE;
+
+ private:
   grpc::Status PrepareMove(grpc::ServerContext*, const axisd::v1::PrepareMoveRequest*,
                            axisd::v1::PrepareMoveResponse* response) override {
     fill(*response->mutable_move());
@@ -36,9 +41,9 @@ class Moving final : public axisd::v1::GroupService::Service {
     fill(*response->mutable_move());
     return grpc::Status::OK;
   }
-  static void fill(axisd::v1::GroupMove& move) {
+  void fill(axisd::v1::GroupMove& move) const {
     move.set_id("g-1");
-    move.set_state(axisd::v1::COMMAND_STATE_ACTIVE);
+    move.set_state(state);
     move.mutable_preparation()->mutable_starts_at()->set_seconds(7);
   }
 };
@@ -164,6 +169,24 @@ TEST_F(GroupMovesTest, OtherContentUnderTheSameIdIsRefused) {
   ask();
   ASSERT_TRUE(answer_);
   EXPECT_EQ(answer_->error_code(), StatusCode::ALREADY_EXISTS);
+}
+
+TEST_F(GroupMovesTest, HowMovesEndIsCounted) {
+  ask();
+  EXPECT_EQ(moves_.open(), 1);
+  service_.state = axisd::v1::COMMAND_STATE_DONE;
+  EXPECT_TRUE(run_until([&] { return answer_.has_value(); }));
+  EXPECT_EQ(move_.state(), axisd::v1::COMMAND_STATE_DONE);
+  ask();
+  EXPECT_TRUE(answer_) << "it is known";
+  service_.state = axisd::v1::COMMAND_STATE_ABORTED;
+  request_.mutable_options()->set_request_id("r-2");
+  ask();
+  EXPECT_TRUE(run_until([&] { return answer_.has_value(); }));
+  EXPECT_EQ(moves_.open(), 0);
+  EXPECT_EQ(moves_.tally().done, 1U);
+  EXPECT_EQ(moves_.tally().otherwise, 1U);
+  EXPECT_EQ(moves_.tally().unknown + moves_.tally().refused, 0U);
 }
 
 TEST_F(GroupMovesTest, AtItsEndItIsToldWhetherAnythingMayHaveMoved) {
