@@ -49,22 +49,25 @@ grpc::Status check_tolerance(const v1::MoveGroupRequest& request) {
   return invalid("clock_tolerance is no such time", "give more than 0 s, and at most 1 s");
 }
 
+int targets_of(const v1::MoveGroupRequest& request) {
+  int targets = 0;
+  for (const auto& part : request.machines()) targets += part.targets_size();
+  return targets;
+}
+
 /// What this entrance keeps while the move is under way; what a target may be is for the owner of its axis.
 grpc::Status check_size(const v1::MoveGroupRequest& request) {
   if (request.machines().empty() ||
       static_cast<std::size_t>(request.machines_size()) > GroupMoves::most_machines)
     return invalid("no machine is named, or too many are",
                    fmt::format("name 1 to {}, each with targets", GroupMoves::most_machines));
-  int targets = 0;
-  for (const auto& part : request.machines()) {
-    targets += part.targets_size();
+  for (const auto& part : request.machines())
     for (const auto& target : part.targets())
       if (target.axis().size() > GroupMoves::longest_name)
         return invalid(fmt::format("{}: the name of an axis has {} bytes", config::quoted(part.machine()),
                                    target.axis().size()),
                        fmt::format("names have {} at most", GroupMoves::longest_name));
-  }
-  if (targets > GroupMoves::most_targets)
+  if (const int targets = targets_of(request); targets > GroupMoves::most_targets)
     return invalid(fmt::format("{} targets are given", targets),
                    fmt::format("give at most {} in one move", GroupMoves::most_targets));
   // With all that is not known here.
@@ -100,6 +103,7 @@ struct GroupMoves::Run {
   Caller caller;
   std::string request_id, digest;
   v1::MoveGroupRequest request;  ///< empty once it is over
+  int targets;
   Metadata metadata;
   std::vector<Way> ways{};  ///< of each machine, as they were at the beginning
   GroupMoveMachine machine;
@@ -193,6 +197,7 @@ void GroupMoves::move(const Caller& caller, const v1::MoveGroupRequest& request,
                                        .request_id = request.options().request_id(),
                                        .digest = std::move(digest),
                                        .request = request,
+                                       .targets = targets_of(request),
                                        .metadata = *Callers::metadata_for(caller),
                                        .machine = {names_of(request), tolerance_of(request)}});
   if (const auto connected = connect(*run); !connected.ok()) return answer(connected, {});
@@ -207,10 +212,15 @@ int GroupMoves::open() const {
   return static_cast<int>(std::ranges::count_if(runs_, [](const RunPtr& run) { return !run->over(); }));
 }
 
+/// A machine still tells of some that are forgotten here.
 void GroupMoves::forget_oldest() {
-  auto ended = runs_.size() - static_cast<std::size_t>(open());
-  std::erase_if(runs_,
-                [&ended](const RunPtr& run) { return run->over() && ended > most_ended && ended-- > 0; });
+  std::size_t ended = 0;
+  int targets = 0;
+  for (auto run = runs_.end(); run != runs_.begin();) {
+    if (!(*--run)->over()) continue;
+    targets += (*run)->targets;
+    if (++ended > most_ended || targets > most_ended_targets) run = runs_.erase(run);
+  }
 }
 
 void GroupMoves::end(const grpc::Status& why) {

@@ -51,6 +51,8 @@ class GroupMoves {
   static constexpr std::size_t most_machines = 128;
   /// Of one request, over all machines.
   static constexpr int most_targets = 1024;
+  /// Of all that have ended and are remembered.
+  static constexpr int most_ended_targets = 16 * most_targets;
   static constexpr std::size_t longest_name = 64, most_bytes = 256 * 1024;
 
  private:

@@ -189,6 +189,24 @@ TEST_F(GroupMovesTest, HowMovesEndIsCounted) {
   EXPECT_EQ(moves_.tally().unknown + moves_.tally().refused, 0U);
 }
 
+TEST_F(GroupMovesTest, NotMoreIsRememberedThanFits) {
+  service_.state = axisd::v1::COMMAND_STATE_DONE;
+  while (request_.machines(0).targets_size() < GroupMoves::most_targets)
+    *request_.mutable_machines(0)->add_targets() = request_.machines(0).targets(0);
+  constexpr int fit = GroupMoves::most_ended_targets / GroupMoves::most_targets;
+  const auto ask_for = [this](int number) {
+    request_.mutable_options()->set_request_id("r-" + std::to_string(number));
+    ask();
+    const bool at_once = answer_.has_value();
+    EXPECT_TRUE(run_until([&] { return answer_.has_value(); }));
+    return at_once;
+  };
+  for (int i = 0; i <= fit + 1; ++i) EXPECT_FALSE(ask_for(i)) << "it is new";
+  EXPECT_TRUE(ask_for(fit + 1));
+  EXPECT_TRUE(ask_for(2)) << "it is remembered";
+  EXPECT_FALSE(ask_for(0)) << "its machine is asked";
+}
+
 TEST_F(GroupMovesTest, AtItsEndItIsToldWhetherAnythingMayHaveMoved) {
   const grpc::Status why(StatusCode::UNAVAILABLE, "shutting down");
   ask();
