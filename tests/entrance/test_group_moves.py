@@ -178,6 +178,30 @@ class GroupMoves(CellScenario):
         request.machines[0].targets[0].position = 61.0
         self.refused("ALREADY_EXISTS", "REQUEST_ID_CONFLICT", self.move, here, request)
 
+    def test_what_one_entrance_gives_up_goes_on_where_another_one_has_told_it(self):
+        slow = self.gate(self.presses[2])
+        slow.holds = lambda method, _: method == "RenewPrepared"
+        here, there = self.entrance_of(self.presses[0]), self.entrance_of(self.presses[1], {"press-3": slow.address})
+        request = self.request(60.0, velocity=30.0)
+        with concurrent.futures.ThreadPoolExecutor() as pool:
+            elsewhere = pool.submit(self.move, there, request)
+            self.assertTrue(slow.held.wait(30), "it asks press-3 for its clock, and gives up 0.45 s later")
+            moves = [pool.submit(self.move, here, request).result(), elsewhere.result()]
+        self.assertEqual([move.state for move in moves], [pb.COMMAND_STATE_DONE] * 2, moves)
+        self.assertEqual(self.starts(), [1, 1, 1])
+        self.assertEqual([press.sim.shaft().position for press in self.presses], [60 * PULSES] * 3)
+
+    def test_what_one_entrance_has_given_up_starts_through_no_other_one(self):
+        slow = self.gate(self.presses[2])
+        slow.holds = lambda method, _: method == "RenewPrepared"
+        here, there = self.entrance_of(self.presses[0]), self.entrance_of(self.presses[1], {"press-3": slow.address})
+        request = self.request(60.0)
+        self.refused("DEADLINE_EXCEEDED", "OFFLINE", self.move, there, request)
+        self.assertEqual(self.move(here, request).state, pb.COMMAND_STATE_ABORTED)
+        for press in self.presses:
+            self.assertEqual(press.client.state("feeder").state, pb.STATE_STANDSTILL)
+        self.assertEqual(self.starts(), [0, 0, 0])
+
     def test_all_stand_where_the_coordinator_is_killed_in_motion(self):
         entrance = self.entrance_of(self.presses[0])
         move = self.move(entrance, self.request(390.0, velocity=20.0, until=pb.WAIT_UNTIL_STARTED))
