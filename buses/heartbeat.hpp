@@ -6,7 +6,7 @@
 namespace axisd {
 
 /// Longest that a loop sleeps which the watchdog looks at: four times shorter than the shortest stall that it
-/// takes for death (daemon/core/supervision.hpp), so that a loop which is woken late is none.
+/// takes for death (buses/supervision.hpp), so that a loop which is woken late is none.
 inline constexpr Duration heartbeat = std::chrono::milliseconds(200);
 
 }  // namespace axisd

@@ -9,13 +9,11 @@
 #include <vector>
 
 #include "buses/log_about.hpp"
-#include "daemon/core/supervision.hpp"
+#include "buses/supervision.hpp"
 
 namespace axisd {
 
 namespace {
-
-using core::Supervision;
 
 void reload_at_a_signal(ConfigurationService& served) {
   served.reload("SIGHUP", false, [](const Result<ConfigurationReload>& result) {

@@ -24,7 +24,7 @@ struct Supervised {
 /// Those that supervise() takes: every thread of the process has them blocked.
 [[nodiscard]] sigset_t ending_signals();
 
-/// Tells systemd that all of it lives (core/supervision.hpp), until a signal asks for the end: which one.
+/// Tells systemd that all of it lives (buses/supervision.hpp), until a signal asks for the end: which one.
 /// SIGHUP reloads. Thread: first.
 [[nodiscard]] int supervise(const Supervised& parts);
 

@@ -29,6 +29,9 @@ class Entrance {
   /// Nobody is let in any more, and what is open ends. Blocks, for a second at most; the core has to run
   /// meanwhile.
   void close();
+  /// As of transport::AcceptLoop. Thread: any.
+  [[nodiscard]] TimePoint last_progress() const { return accept_.last_progress(); }
+  [[nodiscard]] TimePoint last_hand_over() { return accept_.last_hand_over(); }
 
  private:
   const Settings& settings_;

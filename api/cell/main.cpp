@@ -20,6 +20,7 @@
 #include "api/cell/entrance.hpp"
 #include "api/cell/options.hpp"
 #include "api/cell/settings.hpp"
+#include "api/cell/watch.hpp"
 #include "api/exposition/http_server.hpp"
 #include "api/program/program.hpp"
 #include "api/tls/digest.hpp"
@@ -53,15 +54,17 @@ std::string computer_of(const std::string& path) {
   return tls::digest_of("axisd-cell " + line);
 }
 
-/// Tells systemd that the loop comes round, and the metrics what there is.
+/// Zero: nobody watches.
+Duration watchdog_interval() {
+  std::uint64_t interval_us = 0;
+  return sd_watchdog_enabled(0, &interval_us) > 0 ? Duration(std::chrono::microseconds(interval_us))
+                                                  : Duration::zero();
+}
+
+/// Tells the metrics what there is.
 class Pulse {
  public:
-  Pulse(Clock& clock, const Cell& cell) : clock_(clock), cell_(cell) {
-    std::uint64_t interval_us = 0;
-    if (sd_watchdog_enabled(0, &interval_us) > 0)
-      period_ = std::min<Duration>(period_, std::chrono::microseconds(interval_us) / 3);
-    beat();
-  }
+  Pulse(Clock& clock, const Cell& cell) : clock_(clock), cell_(cell) { beat(); }
   /// Thread: any.
   [[nodiscard]] std::shared_ptr<const Reading> reading() const {
     const std::lock_guard lock(mutex_);
@@ -70,17 +73,15 @@ class Pulse {
 
  private:
   void beat() {
-    sd_notify(0, "WATCHDOG=1");
     auto reading = std::make_shared<const Reading>(cell_.reading());
     {
       const std::lock_guard lock(mutex_);
       reading_.swap(reading);
     }
-    timer_ = clock_.call_at(clock_.now() + period_, [this] { beat(); });
+    timer_ = clock_.call_at(clock_.now() + reading_period, [this] { beat(); });
   }
   Clock& clock_;
   const Cell& cell_;
-  Duration period_ = reading_period;
   mutable std::mutex mutex_;
   std::shared_ptr<const Reading> reading_;  ///< under mutex_
   Clock::Timer timer_;
@@ -142,6 +143,13 @@ int serve(const Settings& settings, const std::string& machine_id_file, Certific
   if (!port) program::leave_at_once(give_up(port.error()));
   cell.start();
   const Pulse pulse(clock, cell);
+  const Watch watch(
+      clock, watchdog_interval(),
+      [&] {
+        return Watch::Progress{.accept_loop = entrance.last_progress(),
+                               .hand_over = entrance.last_hand_over()};
+      },
+      [](const char* state) { sd_notify(0, state); });
   auto exposed = serve_metrics(settings, pulse);
   if (!exposed) program::leave_at_once(give_up(exposed.error()));
   certificates.keep(clock, cell);

@@ -30,8 +30,8 @@ OURS = {
     # Nothing of devices and buses but what has no say in motion, each by its name.
     "api/cell": ["api/cell/", "api/program/", "api/settings/", "api/tls/", "api/transport/", "api/exposition/", "axisd/v1/", "axisd/cell/v1/",
                  "buses/asio_clock.hpp", "buses/clock.hpp", "buses/error.hpp", "buses/file_descriptor.hpp",
-                 "buses/latency_histogram.hpp", "buses/limited_log.hpp", "config/diagnostics.hpp",
-                 "config/document.hpp", "config/quantity.hpp", "config/text.hpp"],
+                 "buses/latency_histogram.hpp", "buses/limited_log.hpp", "buses/supervision.hpp",
+                 "config/diagnostics.hpp", "config/document.hpp", "config/quantity.hpp", "config/text.hpp"],
     "api/web/gateway": ["api/web/gateway/", "api/program/", "api/settings/", "api/tls/", "api/grpc_text/", "api/transport/", "axisd/v1/", "buses/asio_clock.hpp", "buses/clock.hpp",
                         "buses/error.hpp", "buses/file_descriptor.hpp", "config/diagnostics.hpp", "config/document.hpp",
                         "config/quantity.hpp", "config/text.hpp"],

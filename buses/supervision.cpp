@@ -1,8 +1,8 @@
-#include "daemon/core/supervision.hpp"
+#include "buses/supervision.hpp"
 
 #include <algorithm>
 
-namespace axisd::core {
+namespace axisd {
 
 namespace {
 
@@ -39,4 +39,4 @@ Supervision::Finding Supervision::look(TimePoint now, const std::vector<Part>& p
   return finding;
 }
 
-}  // namespace axisd::core
+}  // namespace axisd

@@ -1,4 +1,4 @@
-#include "daemon/core/supervision.hpp"
+#include "buses/supervision.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,7 +7,7 @@
 
 #include "buses/heartbeat.hpp"
 
-namespace axisd::core {
+namespace axisd {
 namespace {
 
 using std::chrono::milliseconds;
@@ -98,4 +98,4 @@ TEST(Unwatched, IsLookedAtSeldomAndWithPatience) {
 }
 
 }  // namespace
-}  // namespace axisd::core
+}  // namespace axisd

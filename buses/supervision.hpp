@@ -7,7 +7,7 @@
 
 #include "buses/clock.hpp"
 
-namespace axisd::core {
+namespace axisd {
 
 /// Decides from what its threads have stamped. Nothing that it decides on can hold it up: it reads times, and
 /// waits for nobody. A thread that has not come round for three quarters of the watchdog's interval is taken
@@ -48,4 +48,4 @@ class Supervision {
   TimePoint last_look_;  ///< far back: there was none
 };
 
-}  // namespace axisd::core
+}  // namespace axisd
