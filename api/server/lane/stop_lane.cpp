@@ -1,13 +1,10 @@
 #include "api/server/lane/stop_lane.hpp"
 
 #include <fmt/format.h>
-#include <netinet/in.h>
-#include <netinet/tcp.h>
 #include <poll.h>
 #include <pthread.h>
 #include <spdlog/spdlog.h>
 #include <sys/eventfd.h>
-#include <sys/socket.h>
 
 #include <algorithm>
 #include <bit>
@@ -19,17 +16,19 @@
 #include <utility>
 
 #include "api/server/lane/connection.hpp"
+#include "api/server/lane/lobby.hpp"
 #include "api/server/lane/stop_calls.hpp"
 #include "api/server/local_peer.hpp"
 #include "api/server/peer.hpp"
 #include "api/server/status.hpp"
 #include "api/transport/listen.hpp"
-#include "api/transport/peer_socket.hpp"
 #include "buses/heartbeat.hpp"
 
 namespace axisd::server {
 
 using lane::Connection;
+using lane::Crowd;
+using lane::Lobby;
 using lane::Places;
 using lane::StopCalls;
 
@@ -39,20 +38,6 @@ namespace {
 constexpr Duration when_full = std::chrono::milliseconds(100);
 /// Until it is looked again whether a client may be read from that had too many stops waiting.
 constexpr Duration when_crowded = std::chrono::milliseconds(5);
-/// Accepted at once, before those who are there are served again: half of what an address may have of
-/// strangers, so that whoever comes is listened to before he may have to make room.
-constexpr int most_accepted = 4;
-
-/// As gRPC writes it.
-std::string text_of(const sockaddr_storage& address, socklen_t size) {
-  char host[NI_MAXHOST]{}, port[NI_MAXSERV]{};
-  if (address.ss_family == AF_UNIX) return "unix:";
-  if (getnameinfo(reinterpret_cast<const sockaddr*>(&address), size, host, sizeof host, port, sizeof port,
-                  NI_NUMERICHOST | NI_NUMERICSERV) != 0)
-    return "ipv4:unknown:0";
-  return address.ss_family == AF_INET6 ? fmt::format("ipv6:[{}]:{}", host, port)
-                                       : fmt::format("ipv4:{}:{}", host, port);
-}
 
 Peer peer_called(const std::string& host, const std::string& address) {
   return {.name = "local:" + host, .address = address};
@@ -72,9 +57,10 @@ class StopLane::Loop : public std::enable_shared_from_this<StopLane::Loop> {
   Loop(Machine& machine, const StopLaneOptions& options)
       : machine_(&machine),
         calls_(machine, options.access, options.audit_sink),
+        lobby_(options.silent),
         places_(options.limits),
         tls_(options.tls) {
-    if (wake_.get() < 0) throw std::bad_alloc();
+    if (wake_.get() < 0 || lobby_.fd() < 0) throw std::bad_alloc();
   }
 
   void open(std::vector<transport::ListeningSocket> sockets) { sockets_ = std::move(sockets); }
@@ -117,8 +103,9 @@ class StopLane::Loop : public std::enable_shared_from_this<StopLane::Loop> {
   [[nodiscard]] bool is_crowded(const Client& client) const;
   void serve_in_turn(std::vector<Id> ids);
   void accept_from(const transport::ListeningSocket& socket);
+  bool let_in_who_speaks();
   void let_in_from_inside();
-  void enter(FileDescriptor socket, std::optional<Peer> peer, const std::string& address);
+  Id enter(FileDescriptor socket, std::optional<Peer> peer, std::string address, Crowd::Origin origin);
   void serve(Id id);
   void begin(Id id, const lane::Http2::Call& call);
   void identify(Id id, Client& client);
@@ -130,6 +117,7 @@ class StopLane::Loop : public std::enable_shared_from_this<StopLane::Loop> {
 
   Machine* machine_;
   StopCalls calls_;
+  Lobby lobby_;
   Places places_;
   std::vector<transport::ListeningSocket> sockets_;
   const std::shared_ptr<const tls::Live> tls_;  ///< nullptr: there is none
@@ -153,6 +141,7 @@ void StopLane::Loop::run() {
       spdlog::critical("stop lane: {}; all of its connections are closed", error.what());
       clients_.clear();
       places_.clear();
+      lobby_.clear();
     }
   }
   say_goodbye();
@@ -165,6 +154,8 @@ bool StopLane::Loop::serve_once() {
   progress_.store(monotonic_now(), std::memory_order_relaxed);
   const bool full = monotonic_now() < full_until_;
   polled.push_back({.fd = wake_.get(), .events = POLLIN, .revents = 0});
+  polled.push_back({.fd = lobby_.fd(), .events = POLLIN, .revents = 0});
+  const auto doors = polled.size();
   for (const auto& socket : sockets_)
     polled.push_back({.fd = full ? -1 : socket.fd.get(), .events = POLLIN, .revents = 0});
   const auto first = polled.size();
@@ -182,7 +173,7 @@ bool StopLane::Loop::serve_once() {
     ids.push_back(id);
   }
   const auto until = std::min<Duration>({full ? when_full : heartbeat, crowded ? when_crowded : heartbeat,
-                                         places_.next_due() - monotonic_now()});
+                                         std::min(places_.next_due(), lobby_.next_due()) - monotonic_now()});
   const auto patience = std::chrono::ceil<std::chrono::milliseconds>(std::max(until, Duration{}));
   if (poll(polled.data(), polled.size(), static_cast<int>(patience.count())) < 0 && errno != EINTR) {
     spdlog::critical("stop lane: poll: {}", std::generic_category().message(errno));
@@ -198,9 +189,12 @@ bool StopLane::Loop::serve_once() {
     if (polled[first + i].revents != 0 && clients_.contains(ids[i]))  // it may have ended with its answer
       ready.push_back(ids[i]);
   serve_in_turn(std::move(ready));
-  for (std::size_t i = 0; i < sockets_.size(); ++i)
-    if (polled[i + 1].revents != 0) accept_from(sockets_[i]);
+  // Whoever speaks is let in before others come, who would otherwise push him out.
+  if (polled[1].revents == 0 || let_in_who_speaks())
+    for (std::size_t i = 0; i < sockets_.size(); ++i)
+      if (polled[doors + i].revents != 0) accept_from(sockets_[i]);
   close(places_.overdue(monotonic_now()));
+  lobby_.end_overdue(monotonic_now());
   return true;
 }
 
@@ -221,32 +215,24 @@ void StopLane::Loop::serve_in_turn(std::vector<Id> ids) {
 }
 
 void StopLane::Loop::accept_from(const transport::ListeningSocket& socket) {
-  for (int i = 0; i < most_accepted; ++i) {
-    sockaddr_storage address{};
-    socklen_t size = sizeof address;
-    FileDescriptor connection(
-        accept4(socket.fd.get(), reinterpret_cast<sockaddr*>(&address), &size, SOCK_NONBLOCK | SOCK_CLOEXEC));
-    if (connection.get() < 0) {
-      // Out of descriptors: somebody makes room, so that whoever wants to stop comes in.
-      const bool none_left = errno == EMFILE || errno == ENFILE || errno == ENOMEM || errno == ENOBUFS;
-      const auto leaves = none_left ? places_.least_needed() : std::nullopt;
-      if (none_left && !leaves) full_until_ = monotonic_now() + when_full;
-      return close(leaves);
-    }
-    if (socket.knock->let_in(connection.get())) continue;
-    if (socket.unix_path.empty()) {
-      const int on = 1, patience_ms = 10'000;
-      setsockopt(connection.get(), IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
-      setsockopt(connection.get(), SOL_SOCKET, SO_KEEPALIVE, &on, sizeof on);
-      setsockopt(connection.get(), IPPROTO_TCP, TCP_USER_TIMEOUT, &patience_ms, sizeof patience_ms);
-    }
-    const auto from = text_of(address, size);
-    const bool local = !socket.unix_path.empty();
-    auto peer = local  ? std::optional(local_peer(connection.get()))
+  if (lobby_.accept_from(socket, monotonic_now()) || lobby_.make_room()) return;
+  // Out of descriptors: somebody makes room, so that whoever wants to stop comes in.
+  const auto leaves = places_.least_needed();
+  if (!leaves) full_until_ = monotonic_now() + when_full;
+  close(leaves);
+}
+
+/// False: there may be more of them.
+bool StopLane::Loop::let_in_who_speaks() {
+  auto speakers = lobby_.take_speakers();
+  for (auto& [socket, address, origin, local] : speakers.guests) {
+    auto peer = local  ? std::optional(local_peer(socket.get()))
                 : tls_ ? std::nullopt
-                       : std::optional(peer_called(peer_host(from), from));
-    enter(std::move(connection), std::move(peer), from);
+                       : std::optional(peer_called(origin.address, address));
+    // At once: whoever has begun his handshake does not make room for those who have not.
+    serve(enter(std::move(socket), std::move(peer), std::move(address), std::move(origin)));
   }
+  return speakers.all;
 }
 
 void StopLane::Loop::let_in_from_inside() {
@@ -255,24 +241,27 @@ void StopLane::Loop::let_in_from_inside() {
     const std::lock_guard lock(mutex_);
     joining.swap(joining_);
   }
-  for (auto& socket : joining) enter(std::move(socket), peer_called("daemon", "daemon"), "daemon");
+  constexpr auto* inside = "daemon";
+  for (auto& socket : joining)
+    enter(std::move(socket), peer_called(inside, inside), inside, {.address = inside, .network = inside});
 }
 
 /// `peer`: nothing: whom its certificate names.
-void StopLane::Loop::enter(FileDescriptor socket, std::optional<Peer> peer, const std::string& address) {
+StopLane::Loop::Id StopLane::Loop::enter(FileDescriptor socket, std::optional<Peer> peer, std::string address,
+                                         Crowd::Origin origin) {
   const auto id = ++last_;
   const auto now = monotonic_now();
-  auto network = transport::address_of_peer(socket.get());
   auto acceptor = peer ? nullptr : tls_->served()->acceptor;
   auto& client = clients_[id];
-  client.host = peer_host(address);
-  client.address = address;
+  client.host = origin.address;
+  client.address = std::move(address);
   client.peer = std::move(peer);
   client.connection = std::make_unique<Connection>(
       std::move(socket), std::move(acceptor), [this, id](const lane::Http2::Call& call) { begin(id, call); },
       now);
-  close(places_.enter(id, {.address = client.host, .network = std::move(network)}, now));
+  close(places_.enter(id, {.address = std::move(origin.address), .network = std::move(origin.network)}, now));
   if (client.peer) close(places_.identify(id, client.peer->name, true, now));
+  return id;
 }
 
 /// Precondition: the connection is identified, by a certificate.
@@ -359,6 +348,7 @@ void StopLane::Loop::say_goodbye() {
     (void)client.connection->write();
   }
   clients_.clear();
+  lobby_.clear();
   sockets_.clear();
 }
 

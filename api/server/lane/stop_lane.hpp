@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "api/server/access.hpp"
+#include "api/server/lane/crowd.hpp"
 #include "api/server/lane/places.hpp"
 #include "api/tls/live.hpp"
 #include "api/transport/knock.hpp"
@@ -18,8 +19,9 @@
 namespace axisd::server {
 
 struct StopLaneOptions {
-  std::string listen;  ///< "HOST:PORT", "[IPV6]:PORT" or "unix:PATH"
-  lane::Places::Limits limits{};
+  std::string listen;             ///< "HOST:PORT", "[IPV6]:PORT" or "unix:PATH"
+  lane::Crowd::Limits silent{};   ///< who has said nothing yet
+  lane::Places::Limits limits{};  ///< everybody else
   // As of ServerOptions: the same for both.
   std::shared_ptr<const tls::Live> tls{};
   std::shared_ptr<const AccessControl> access{};

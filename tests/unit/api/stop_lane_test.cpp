@@ -217,6 +217,41 @@ TEST_F(Lane, SilentConnectionsKeepNobodyOut) {
   EXPECT_TRUE(stop(*stub).first.ok());
 }
 
+/// As a client of a busy computer: others connect between its connection and its first word.
+TEST_F(Lane, WhoeverIsSlowToSpeakKeepsItsPlaceInACrowd) {
+  serve();
+  auto ours = silent();
+  std::vector<FileDescriptor> crowd;
+  crowd.reserve(400);
+  for (int i = 0; i < 400; ++i) crowd.push_back(silent());
+  auto fence = client();
+  ASSERT_TRUE(stop(*fence).first.ok()) << "all of them have been let in";
+  auto slow = v1::StopService::NewStub(grpc::CreateInsecureChannelFromFd("axisd", ours.release()));
+  const auto [status, response] = stop(*slow);
+  EXPECT_TRUE(status.ok()) << status.error_message();
+  EXPECT_EQ(response.command().client(), "local:localhost");
+}
+
+TEST_F(Lane, WhoeverSaysNothingHasItsTime) {
+  serve({.silent = {.patience = 50ms}});
+  const auto mute = silent();
+  char byte = 0;
+  EXPECT_EQ(recv(mute.get(), &byte, 1, 0), 0) << "it is closed";
+  auto stub = client();
+  EXPECT_TRUE(stop(*stub).first.ok());
+}
+
+TEST_F(Lane, OfACrowdBeyondItsRoomTheOldestGo) {
+  serve({.silent = {.most = 4}});
+  const auto oldest = silent();
+  std::vector<FileDescriptor> crowd;
+  crowd.reserve(4);
+  for (int i = 0; i < 4; ++i) crowd.push_back(silent());
+  char byte = 0;
+  EXPECT_EQ(recv(oldest.get(), &byte, 1, 0), 0) << "it is closed";
+  EXPECT_EQ(recv(crowd.back().get(), &byte, 1, MSG_DONTWAIT), -1) << "it is open";
+}
+
 TEST_F(Lane, ClientsThatAreKilledWhileTheyWaitHarmNobody) {
   serve();
   for (int i = 0; i < 20; ++i) {
