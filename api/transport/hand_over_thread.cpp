@@ -2,11 +2,22 @@
 
 #include <pthread.h>
 
+#include <algorithm>
 #include <utility>
 
 #include "api/transport/peer_socket.hpp"
 
 namespace axisd::transport {
+namespace {
+
+/// Changes while bytes come. The kernel counts those of TCP; on a unix socket what waits there changes while
+/// both ends are at it.
+std::uint64_t bytes_on(int connection) {
+  const auto received = traffic_of(connection).received;
+  return received > 0 ? received : unread_on(connection);
+}
+
+}  // namespace
 
 void HandOverThread::start() {
   thread_ = std::thread([this] { run(); });
@@ -42,6 +53,10 @@ void HandOverThread::stop() {
 std::optional<HandOverThread::Kept> HandOverThread::kept_by(TimePoint now) {
   const std::lock_guard lock(mutex_);
   if (!inside_ || now - inside_->since < patience) return std::nullopt;
+  const auto bytes = bytes_on(inside_->watched->get());
+  const auto before = inside_->bytes.value_or(bytes);
+  inside_->bytes = before;
+  if (std::max(bytes, before) - std::min(bytes, before) <= little) return std::nullopt;
   return Kept{.id = inside_->id, .watched = inside_->watched};
 }
 

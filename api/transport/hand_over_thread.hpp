@@ -10,6 +10,7 @@
 #include <optional>
 #include <thread>
 
+#include "api/transport/peer_budgets.hpp"
 #include "buses/clock.hpp"
 #include "buses/file_descriptor.hpp"
 
@@ -32,8 +33,10 @@ class HandOverThread {
     Id id;
     Watched watched;
   };
-  /// Whoever keeps the thread for longer is to be ended.
+  /// Whoever keeps the thread for longer, and goes on sending, is to be ended.
   static constexpr Duration patience = std::chrono::milliseconds(500);
+  /// Bytes that come meanwhile which are nobody's fault: pings, and the like.
+  static constexpr std::uint64_t little = PeerBudgets::quiet;
 
   HandOverThread() = default;
   ~HandOverThread() { stop(); }
@@ -48,7 +51,9 @@ class HandOverThread {
   bool take_back(Id id);
   /// Closes what waits, and resets what is being taken in. Idempotent.
   void stop();
-  /// Who keeps the thread for longer than `patience`, whether others wait or not. Thread: any.
+  /// Who has kept the thread for longer than `patience` and has sent more than `little` since that was found,
+  /// whether others wait or not. Without that it is not its bytes that keep the thread: the process stood
+  /// still, or gRPC waits for something else. Thread: any.
   [[nodiscard]] std::optional<Kept> kept_by(TimePoint now);
   /// Since when it has been owed that the thread comes round, because somebody waits for it or is inside;
   /// `now`: it is not. Who is taken back still waits by that. Thread: any.
@@ -65,6 +70,7 @@ class HandOverThread {
     Id id;
     Watched watched;
     TimePoint since;
+    std::optional<std::uint64_t> bytes{};  ///< once it was found to keep the thread
   };
   void run();
 

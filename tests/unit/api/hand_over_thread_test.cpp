@@ -11,7 +11,9 @@
 #include <atomic>
 #include <cerrno>
 #include <future>
+#include <iterator>
 #include <list>
+#include <string>
 #include <vector>
 
 #include "api/transport/listen.hpp"
@@ -33,14 +35,38 @@ struct Ends {
   HandOverThread::Watched watched;
 };
 
+/// The kernel counts what comes on it.
+std::pair<FileDescriptor, FileDescriptor> on_tcp() {
+  const FileDescriptor listening(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
+  sockaddr_in address{
+      .sin_family = AF_INET, .sin_port = 0, .sin_addr = {htonl(INADDR_LOOPBACK)}, .sin_zero = {}};
+  socklen_t size = sizeof address;
+  auto* const any = reinterpret_cast<sockaddr*>(&address);
+  EXPECT_EQ(::bind(listening.get(), any, size), 0);
+  EXPECT_EQ(::listen(listening.get(), 1), 0);
+  EXPECT_EQ(::getsockname(listening.get(), any, &size), 0);
+  FileDescriptor ours(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
+  EXPECT_EQ(::connect(ours.get(), any, size), 0);
+  FileDescriptor theirs(::accept4(listening.get(), nullptr, nullptr, SOCK_CLOEXEC));
+  return {std::move(ours), std::move(theirs)};
+}
+
+/// Until the kernel has counted it at the other end. On TCP.
+void send(const Ends& ends, std::size_t bytes) {
+  const auto total = transport::traffic_of(ends.watched->get()).received + bytes;
+  const std::string text(bytes, 'x');
+  ASSERT_EQ(::send(ends.ours.get(), text.data(), text.size(), 0), std::ssize(text));
+  while (transport::traffic_of(ends.watched->get()).received < total) std::this_thread::yield();
+}
+
 /// gRPC that is kept by each connection until its end.
 class Kept {
  public:
   const HandOverThread::HandOver take = [this](const FileDescriptor& connection) {
     ++taken_;
     char byte = 0;
-    while (read(connection.get(), &byte, 1) != 0) {
-    }
+    ssize_t got = 1;
+    while (got > 0 || (got < 0 && errno == EAGAIN)) got = read(connection.get(), &byte, 1);
   };
   void wait_for(int number) const {
     while (taken_ < number) std::this_thread::yield();
@@ -113,7 +139,7 @@ TEST(HandOverThread, OnlyWhoIsInsideIsTold) {
     honest.push_back(std::move(connection));
     if (honest.size() == 4) all.set_value();
   };
-  Ends first;
+  Ends first(on_tcp());
   std::list<Ends> others(4);
   HandOverThread thread;
   thread.start();
@@ -122,6 +148,8 @@ TEST(HandOverThread, OnlyWhoIsInsideIsTold) {
   thread.hand_over(id, keep, std::move(first.theirs), first.watched);
   grpc.wait_for(1);
   const auto late = [] { return monotonic_now() + HandOverThread::patience; };
+  EXPECT_FALSE(thread.kept_by(late()));
+  send(first, HandOverThread::little + 1);
   ASSERT_TRUE(thread.kept_by(late())) << "nobody has to wait for that";
   for (auto& each : others) thread.hand_over(++id, take, std::move(each.theirs), each.watched);
   EXPECT_FALSE(thread.kept_by(begin)) << "not for long";
@@ -131,6 +159,8 @@ TEST(HandOverThread, OnlyWhoIsInsideIsTold) {
   EXPECT_EQ(kept->watched, first.watched);
   transport::reset(kept->watched->get());
   all.get_future().wait();
+  while (thread.last_progress(TimePoint::max()) != TimePoint::max())
+    std::this_thread::yield();  // is done with them
   EXPECT_FALSE(thread.take_back(id));
   thread.stop();
   char byte = 0;
@@ -138,6 +168,25 @@ TEST(HandOverThread, OnlyWhoIsInsideIsTold) {
     EXPECT_EQ(::recv(each.ours.get(), &byte, 1, MSG_DONTWAIT), -1) << "it is open";
     EXPECT_EQ(errno, EAGAIN);
   }
+}
+
+/// The process stood still, or gRPC waits for something else: whoever happens to be inside has done nothing.
+TEST(HandOverThread, WhoSendsNoMoreIsNotToBlame) {
+  Ends ends(on_tcp());
+  Kept grpc;
+  HandOverThread thread;
+  thread.start();
+  send(ends, 400);
+  thread.hand_over(1, grpc.take, std::move(ends.theirs), ends.watched);
+  grpc.wait_for(1);
+  const auto late = monotonic_now() + HandOverThread::patience;
+  EXPECT_FALSE(thread.kept_by(late));
+  EXPECT_FALSE(thread.kept_by(late + std::chrono::hours(1)));
+  send(ends, HandOverThread::little);
+  EXPECT_FALSE(thread.kept_by(late));
+  send(ends, 1);
+  EXPECT_TRUE(thread.kept_by(late));
+  thread.stop();
 }
 
 TEST(HandOverThread, TheWatchdogSeesWhoeverIsInside) {
@@ -180,17 +229,7 @@ TEST(HandOverThread, NothingIsOwedToWhoWasTakenBackInTime) {
 
 /// Whatever has come before: gRPC's own threads read it, and none of these.
 TEST(HandOverThread, NobodyHearsOfWhatHasComeUntilItIsHandedOver) {
-  const FileDescriptor listening(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
-  sockaddr_in address{
-      .sin_family = AF_INET, .sin_port = 0, .sin_addr = {htonl(INADDR_LOOPBACK)}, .sin_zero = {}};
-  socklen_t size = sizeof address;
-  auto* const any = reinterpret_cast<sockaddr*>(&address);
-  ASSERT_EQ(::bind(listening.get(), any, size), 0);
-  ASSERT_EQ(::listen(listening.get(), 1), 0);
-  ASSERT_EQ(::getsockname(listening.get(), any, &size), 0);
-  FileDescriptor ours(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
-  ASSERT_EQ(::connect(ours.get(), any, size), 0);
-  Ends ends({std::move(ours), FileDescriptor(::accept4(listening.get(), nullptr, nullptr, SOCK_CLOEXEC))});
+  Ends ends(on_tcp());
   ASSERT_EQ(::send(ends.ours.get(), "hello", 5, MSG_NOSIGNAL), 5);
   pollfd told{.fd = ends.watched->get(), .events = POLLIN, .revents = 0};
   ASSERT_EQ(::poll(&told, 1, -1), 1) << "it is there";
