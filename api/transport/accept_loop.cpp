@@ -61,6 +61,7 @@ Result<void> AcceptLoop::start(std::vector<Entry> entries, const PeerBudgets::Li
   streams_of_one_ = streams.of_one;
   trims_.emplace(resident_memory());
   memory_limit_ = limits.memory;
+  leaving_ = limits.leaving;
   in_progress_ = std::move(in_progress);
   entries_ = std::move(entries);
   trimmer_.start();
@@ -99,8 +100,9 @@ void AcceptLoop::run() {
       polled.push_back({.fd = entry.socket.fd.get(), .events = POLLIN, .revents = 0});
     watched.clear();
     for (const auto& [id, connection] : connections_) {
-      const short asked = connection.still_sends ? POLLRDHUP : 0;  // POLLHUP is told unasked
-      polled.push_back({.fd = connection.fd->get(), .events = asked, .revents = 0});
+      const bool has_left = connection.phase == Phase::left;
+      const short asked = connection.phase == Phase::open ? POLLRDHUP : 0;  // POLLHUP is told unasked
+      polled.push_back({.fd = has_left ? -1 : connection.fd->get(), .events = asked, .revents = 0});
       watched.push_back(id);
     }
     progress_.store(monotonic_now(), std::memory_order_relaxed);
@@ -112,7 +114,7 @@ void AcceptLoop::run() {
     }
     for (std::size_t i = 0; i < watched.size(); ++i)
       if (const auto told = polled[1 + entries_.size() + i].revents; told == POLLRDHUP)
-        connections_.at(watched[i]).still_sends = false;
+        connections_.at(watched[i]).enter(Phase::listens, monotonic_now());
       else if (told != 0)
         on_end(watched[i]);
     bool fine = true;
@@ -121,6 +123,7 @@ void AcceptLoop::run() {
     if (const auto now = monotonic_now(); now - counted_ >= count_every_) {
       counted_ = now;
       count_traffic(now);
+      look_at_leaving(now);
       for (auto* way : {&tcp_, &local_}) look_at_hand_over(*way, now);
       look_at_memory(now);
     }
@@ -143,7 +146,22 @@ void AcceptLoop::on_end(PeerBudgets::Id id) {
       std::cmp_greater(unread_on(fd->get()) / StreamBudget::least_bytes, streams_of_one_);
   if (leaves_much && !connections_.at(id).peer.empty())
     return cut_off(id, "leaves more than it may have open");
+  // It may be a Stop. Until it is read its place is taken, so that nobody leaves more than he may.
+  auto& connection = connections_.at(id);
+  if (unread_on(fd->get()) > 0 && connection.way->has_waiting(id))
+    return connection.enter(Phase::left, monotonic_now());
   close(id);
+}
+
+void AcceptLoop::look_at_leaving(TimePoint now) {
+  std::vector<PeerBudgets::Id> taken, overdue;
+  for (const auto& [id, connection] : connections_)
+    if (connection.phase == Phase::left && !connection.way->has_waiting(id))
+      taken.push_back(id);
+    else if (connection.phase == Phase::listens && now - connection.since >= leaving_)
+      overdue.push_back(id);
+  for (const auto id : taken) close(id);
+  for (const auto id : overdue) cut_off(id, "has ended its sending, and takes nothing any more");
 }
 
 /// gRPC closes its own descriptor by itself.

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cstdint>
 #include <functional>
 #include <map>
 #include <memory>
@@ -68,9 +69,16 @@ class AcceptLoop {
     HandOverThread* way;         ///< to gRPC
     std::string address;         ///< as it is counted
     std::string peer;            ///< as gRPC names it; empty: it is not on TCP
-    /// Else its peer has ended its sending: gRPC reads what has come, and ends the connection then.
-    bool still_sends = true;
+    enum class Phase : std::uint8_t {
+      open,
+      listens,  ///< its peer sends no more: gRPC reads what has come, and ends the connection then
+      left,     ///< it is over at both ends, and what it has said waits for gRPC
+    };
+    Phase phase = Phase::open;
+    TimePoint since{};  ///< of the phase, but for the first
+    void enter(Phase next, TimePoint now) { phase = next, since = now; }
   };
+  using Phase = Connection::Phase;
   void run();
   /// False: nothing could be accepted, and trying again at once would spin.
   bool accept_one(const Entry& entry);
@@ -92,6 +100,8 @@ class AcceptLoop {
   void cut_off(PeerBudgets::Id id, std::string_view why);
   /// It is over at both ends. Counts what has come since it was counted last.
   void on_end(PeerBudgets::Id id);
+  /// Closes those that gRPC has taken in meanwhile, and resets those that it does not get rid of.
+  void look_at_leaving(TimePoint now);
   void close(PeerBudgets::Id connection);
 
   std::vector<Entry> entries_;
@@ -109,6 +119,7 @@ class AcceptLoop {
   TimePoint counted_{}, looked_{};
   Duration count_every_{};
   std::size_t memory_limit_ = 0;  ///< bytes
+  Duration leaving_{};
   std::int64_t streams_of_one_ = 0;
   std::int64_t streams_gone_ = 0;  ///< of those that have left, since memory was looked after for it
   std::uint64_t cut_off_ = 0, gave_way_ = 0;

@@ -39,6 +39,11 @@ bool HandOverThread::take_back(Id id) {
   return std::erase_if(waiting_, [id](const Waiting& each) { return each.id == id; }) > 0;
 }
 
+bool HandOverThread::has_waiting(Id id) {
+  const std::lock_guard lock(mutex_);
+  return std::ranges::find(waiting_, id, &Waiting::id) != waiting_.end();
+}
+
 void HandOverThread::stop() {
   {
     const std::lock_guard lock(mutex_);

@@ -49,6 +49,8 @@ class HandOverThread {
   void hand_over(Id id, const HandOver& to, FileDescriptor connection, Watched watched);
   /// Closes it if it waits still; false: it does not. Thread: any.
   bool take_back(Id id);
+  /// It has not been brought yet. Thread: any.
+  [[nodiscard]] bool has_waiting(Id id);
   /// Closes what waits, and resets what is being taken in. Idempotent.
   void stop();
   /// Who has kept the thread for longer than `patience` and has sent more than `little` since that was found,

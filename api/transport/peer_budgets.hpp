@@ -31,7 +31,9 @@ class PeerBudgets {
     double burst = 1024 * 1024;               ///< bytes: several of the longest messages
     double longest_penalty = 5;               ///< seconds until a bucket is empty, at most
     Duration idle = std::chrono::seconds(5);  ///< from then on it gives way
-    double suspect = 128 * 1024;              ///< bytes: see most_one_sided()
+    /// Until one that has ended its sending has to be over: answers that it does not take keep it.
+    Duration leaving = std::chrono::seconds(15);
+    double suspect = 128 * 1024;  ///< bytes: see most_one_sided()
     /// Of the process, in bytes: above it the most one-sided connections end.
     std::size_t memory = std::size_t{192} * 1024 * 1024;
   };

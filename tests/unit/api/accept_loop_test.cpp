@@ -6,6 +6,8 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <cerrno>
+#include <chrono>
 #include <mutex>
 #include <string>
 #include <vector>
@@ -29,6 +31,7 @@ class Acceptance : public ::testing::Test {
     port_ = sockets->front().port;
     std::vector<AcceptLoop::Entry> entries;
     entries.push_back({.socket = std::move(sockets->front()), .hand_over = [this](FileDescriptor connection) {
+                         const std::lock_guard taking(taking_);
                          const std::lock_guard lock(mutex_);
                          taken_.push_back(std::move(connection));
                        }});
@@ -64,7 +67,16 @@ class Acceptance : public ::testing::Test {
     return ::recv(taken_.at(which).get(), all.data(), all.size(), MSG_PEEK | MSG_DONTWAIT);
   }
 
+  /// Whatever has happened on the connections by now is known to the loop.
+  void let_loop_come_round() {
+    for (int i = 0; i < 8; ++i) {  // it accepts one at a time
+      const auto before = loop_.last_progress();
+      EXPECT_TRUE(eventually([&] { return loop_.last_progress() > before; }));
+    }
+  }
+
   int port_ = 0;
+  std::mutex taking_;  ///< who has it keeps gRPC from taking any
   std::mutex mutex_;
   std::vector<FileDescriptor> taken_;  ///< under mutex_
   AcceptLoop loop_;
@@ -109,6 +121,38 @@ TEST_F(Acceptance, WhatWhoIsGoneHasLeftIsReadUnlessItIsTooMuch) {
   vanish(std::move(large));
   EXPECT_TRUE(eventually([this] { return left_on(1) <= 0; }));
   EXPECT_EQ(left_on(0), little);
+}
+
+/// It may keep what it asked for, as the answers wait for it.
+TEST_F(Acceptance, WhoEndsItsSendingAndDoesNotLeaveIsReset) {
+  serve({.leaving = std::chrono::milliseconds(50)});
+  const auto ours = client(), other = client();
+  send(ours, hello);
+  ::shutdown(ours.get(), SHUT_WR);
+  char byte = 0;
+  EXPECT_EQ(::recv(ours.get(), &byte, 1, 0), -1);
+  EXPECT_EQ(errno, ECONNRESET);
+  EXPECT_EQ(::recv(other.get(), &byte, 1, MSG_DONTWAIT), -1);
+  EXPECT_EQ(errno, EAGAIN) << "it may go on sending";
+}
+
+/// By a client that sends it and leaves at once, while gRPC is busy with the connection before.
+TEST_F(Acceptance, AStopThatWaitsForGrpcIsReadThoughItsClientHasLeft) {
+  serve();
+  constexpr ssize_t stop = 200;
+  {
+    const std::lock_guard busy(taking_);
+    const auto first = client();
+    auto small = client(), silent = client();
+    send(small, stop);
+    vanish(std::move(small));
+    vanish(std::move(silent));
+    let_loop_come_round();
+  }
+  ASSERT_TRUE(eventually([this] { return taken() == 2; }));
+  EXPECT_EQ(left_on(1), stop);
+  let_loop_come_round();
+  EXPECT_EQ(taken(), 2) << "of who has said nothing there is nothing to read";
 }
 
 /// Others of its address have nearly used up what they all may send: a Stop just before the end is read.
