@@ -204,6 +204,70 @@ TEST_F(StreamBudgetTest, ButNotWithoutEnd) {
   EXPECT_THAT(look(0ms), ElementsAre(5));
 }
 
+/// As one that waits to be handed over.
+TEST_F(StreamBudgetTest, WhoGrpcDoesNotKnowTakesNoLooksFromOthers) {
+  for (Id id = 1; id <= 60; ++id) {
+    enter(id, "a");
+    begin(id, 4);
+  }
+  std::set<Id> asked;
+  for (int i = 0; i < 20; ++i, now_ += 10ms)
+    for (const auto id : budget_.doubtful(now_)) {
+      asked.insert(id);
+      if (id <= 30)
+        budget_.unknown(id, now_);
+      else
+        budget_.seen(id, peers_.at(id).has, 0, now_);
+    }
+  EXPECT_THAT(asked, SizeIs(60));
+}
+
+TEST_F(StreamBudgetTest, WhatGrpcDoesNotKnowAnyMoreCountsAgainstNobody) {
+  enter(1, "a");
+  begin(1, 90);
+  for (int i = 0; i < 2; ++i, now_ += StreamBudget::lasts_for) budget_.seen(1, peers_.at(1).has, 0, now_);
+  ASSERT_TRUE(budget_.most_lasting(now_));
+  budget_.unknown(1, now_);
+  EXPECT_FALSE(budget_.most_lasting(now_));
+}
+
+TEST_F(StreamBudgetTest, WhoTakesNoAnswersKeepsMost) {
+  for (Id id = 1; id <= 3; ++id) enter(id, std::string(1, static_cast<char>('a' + id)));
+  begin(1, 90, 90), begin(2, 20, 20), begin(3, 8, 8);
+  const auto look_at_all = [this] {
+    for (const auto& [id, peer] : peers_) budget_.seen(id, peer.has, 0, now_);
+    now_ += StreamBudget::lasts_for;
+  };
+  look_at_all(), look_at_all();
+  EXPECT_FALSE(budget_.most_lasting(now_)) << "the calls are in progress";
+  // They are answered. The first goes on with others, the second does not read, and few pay no attention.
+  for (auto& [id, peer] : peers_) peer.has.in_progress = 0;
+  look_at_all();
+  begin(1, 90), end(1, 90);
+  look_at_all();
+  ASSERT_TRUE(budget_.most_lasting(now_));
+  EXPECT_EQ(budget_.most_lasting(now_)->id, 2);
+  EXPECT_EQ(budget_.most_lasting(now_)->streams, 20);
+  budget_.leave(2);
+  EXPECT_FALSE(budget_.most_lasting(now_));
+}
+
+/// Whoever spreads them over many connections keeps no less for it.
+TEST_F(StreamBudgetTest, TheAddressWithMostThatLastLosesThem) {
+  enter(1, "operator");
+  begin(1, 12);
+  for (Id id = 2; id <= 9; ++id) {
+    enter(id, "a");
+    begin(id, id == 5 ? 7 : 6);
+  }
+  for (int i = 0; i < 2; ++i, now_ += StreamBudget::lasts_for)
+    for (const auto& [id, peer] : peers_) budget_.seen(id, peer.has, 0, now_);
+  ASSERT_TRUE(budget_.most_lasting(now_));
+  EXPECT_EQ(budget_.most_lasting(now_)->id, 5);
+  EXPECT_EQ(budget_.most_lasting(now_)->streams, 49);
+  EXPECT_FALSE(budget_.most_lasting(now_ + StreamBudget::known_for)) << "that was some time ago";
+}
+
 TEST_F(StreamBudgetTest, WhatWasSeenLongAgoCountsAgainstNobody) {
   enter(1, "a"), enter(2, "a"), enter(3, "a");
   begin(1, 90), begin(2, 90), begin(3, 30);
