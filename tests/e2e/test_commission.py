@@ -93,6 +93,16 @@ class Commission(CommissionScenario):
                          ["COMMAND_STATE_ABORTED", "COMMAND_STATE_DONE"])
         self.assertTrue(machine.wire.writes(STOP, 0))
 
+    def test_an_output_that_changes_on_the_way_is_no_limit_switch(self):
+        machine = self.cell(outputs="{ Y1: in_position }")
+        person = self.person(machine, (r"Go to the switch at X1 [^\]]*\] ", "yes"), (r"Go to the switch at X2 [^\]]*\] ", "abort"),
+                             (r"Actuate ", "skip"))
+        self.assertEqual(person.finish(), 1, person.text)
+        step = person.step("limit positive")
+        self.assertEqual((step["verdict"], step["reason"]),
+                         ("VERDICT_FAILED", "X1 (positive_limit) did not become active on the way"))
+        self.assertEqual(step.get("edges", []), [])
+
     def test_a_wrong_polarity_is_told_with_its_key(self):
         # A switch that closes when it is actuated, and a configuration that says the contrary.
         machine = self.cell(inputs="{ X0: home, X1: { function: positive_limit, active: low } }",

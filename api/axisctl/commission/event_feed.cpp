@@ -2,13 +2,14 @@
 
 #include <utility>
 
+#include "api/axisctl/commission/verdict.hpp"
 #include "axisd/v1/event_service.grpc.pb.h"
 
 namespace axisd::axisctl::commission {
 
-EventFeed::EventFeed(const Client& client, const std::string& axis) : client_(client), axis_(axis) {
+EventFeed::EventFeed(const Client& client, const v1::AxisState& axis) : client_(client), axis_(axis) {
   v1::WatchEventsRequest request;
-  request.add_axes(axis);
+  request.add_axes(axis.axis());
   request.add_kinds(v1::EVENT_KIND_TERMINAL_EDGE);
   thread_ = std::thread([this, request] { read(request); });
   std::unique_lock lock(mutex_);
@@ -35,13 +36,14 @@ void EventFeed::read(const v1::WatchEventsRequest& request) {
   for (v1::WatchEventsResponse message; stream.read(message);) {
     const std::lock_guard lock(mutex_);
     opened_ = true;
-    for (const auto& event : message.events()) edges_.push_back(event.terminal_edge());
+    for (const auto& event : message.events())
+      if (!is_output(axis_, event.terminal_edge().terminal())) edges_.push_back(event.terminal_edge());
     opened_changed_.notify_all();
   }
   const auto status = stream.finish();
   const std::lock_guard lock(mutex_);
   failure_ = status.ok() ? Failure(ExitCode::unreachable, "the daemon ended the stream of events")
-                         : client_.failure(status, axis_);
+                         : client_.failure(status, axis_.axis());
   opened_changed_.notify_all();
 }
 

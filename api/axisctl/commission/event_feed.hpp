@@ -1,4 +1,4 @@
-// The edges of an axis's terminals, none left out.
+// The edges of an axis's inputs, none left out.
 #pragma once
 
 #include <grpcpp/client_context.h>
@@ -6,12 +6,12 @@
 #include <condition_variable>
 #include <mutex>
 #include <optional>
-#include <string>
 #include <thread>
 #include <vector>
 
 #include "api/axisctl/client.hpp"
 #include "axisd/v1/event_service.pb.h"
+#include "axisd/v1/types.pb.h"
 
 namespace axisd::axisctl::commission {
 
@@ -19,19 +19,19 @@ namespace axisd::axisctl::commission {
 class EventFeed {
  public:
   /// Returns once the stream is open: no later edge is missed. Throws Failure.
-  EventFeed(const Client& client, const std::string& axis);
+  EventFeed(const Client& client, const v1::AxisState& axis);
   EventFeed(const EventFeed&) = delete;
   EventFeed& operator=(const EventFeed&) = delete;
   ~EventFeed();
 
-  /// Edges since the last call, in order. Throws Failure if the stream has ended.
+  /// Edges of inputs since the last call, in order. Throws Failure if the stream has ended.
   std::vector<v1::TerminalEdge> take();
 
  private:
   void read(const v1::WatchEventsRequest& request);
 
   const Client& client_;
-  std::string axis_;
+  v1::AxisState axis_;  ///< when this was made: which of its terminals are outputs
   grpc::ClientContext context_;
   std::mutex mutex_;
   std::condition_variable opened_changed_;

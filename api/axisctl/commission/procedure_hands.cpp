@@ -177,7 +177,7 @@ Judgement Procedure::actuate(const StepPlan& plan, Step& step) {
   const auto input = expected(plan);
   if (axis_.state().enabled())
     throw StepEnd(VERDICT_NOT_DONE, "the power stage is on: no hands at the switches");
-  EventFeed feed(axis_.client(), axis_.name());
+  EventFeed feed(axis_.client(), axis_.state());
   const auto collect = [&] {
     for (auto& edge : feed.take()) *step.add_edges() = std::move(edge);
   };

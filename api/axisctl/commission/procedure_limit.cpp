@@ -55,7 +55,7 @@ Judgement Procedure::limit(const StepPlan& plan, Step& step) {
              "hand or by the axis. Keep it actuated then. Enter stops it. Move?",
              name, move_text(distance, motion.velocity, before)),
          step);
-  EventFeed feed(axis_.client(), axis_.name());
+  EventFeed feed(axis_.client(), before);
   LimitObservation seen{.input = expected(plan), .command = {}, .further = {}, .away_left_out = {}};
   std::optional<double> active_at;
   const auto run = follow(axis_.move(distance, motion.velocity), step, [&](const v1::AxisState& state) {
@@ -69,9 +69,7 @@ Judgement Procedure::limit(const StepPlan& plan, Step& step) {
   const auto place = unwrapped(rest.position(), run.samples.back().position(), settings_);
   for (auto& edge : feed.take()) {
     if (edge.terminal() == plan.terminal && edge.active()) seen.became_active = true;
-    if (edge.terminal() != plan.terminal && edge.active() && seen.other.empty())
-      seen.other = edge.function().empty() ? edge.terminal()
-                                           : fmt::format("{} ({})", edge.terminal(), edge.function());
+    if (seen.other.empty()) seen.other = limit_instead(edge, plan.terminal);
     *step.add_edges() = std::move(edge);
   }
   seen.became_active = seen.became_active || active_at.has_value();

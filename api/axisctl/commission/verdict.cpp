@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 
+#include "api/axisctl/commission/plan.hpp"
 #include "api/axisctl/error.hpp"
 #include "api/axisctl/format.hpp"
 
@@ -80,6 +81,10 @@ double seconds_of(const google::protobuf::Timestamp& time) {
 }
 
 }  // namespace
+
+bool is_output(const v1::AxisState& axis, const std::string& terminal) {
+  return std::ranges::any_of(axis.outputs(), [&](const auto& output) { return output.name() == terminal; });
+}
 
 Judgement judge_switch(const ExpectedInput& expected, const std::vector<v1::TerminalEdge>& edges) {
   std::vector<v1::TerminalEdge> own;
@@ -208,6 +213,11 @@ SpeedJudgement judge_speed(const SpeedObservation& move, const std::string& unit
                                             told, time_range(figures.least, figures.most)),
                                 "give a longer --distance, or a lower --velocity")};
   return {.proof = SPEED_PROOF_PROVEN, .judgement = {}};
+}
+
+std::string limit_instead(const v1::TerminalEdge& edge, const std::string& expected) {
+  if (edge.terminal() == expected || !edge.active() || !is_limit(edge.function())) return {};
+  return with_function(edge.terminal(), edge.function());
 }
 
 Judgement judge_limit_end(const LimitObservation& limit) {

@@ -26,7 +26,10 @@ struct ExpectedInput {
   std::string active;  ///< "high", "low"; empty: not known here
 };
 
-/// The terminal was actuated and released: exactly it became active and inactive again.
+/// What a drive switches by itself is no hand at a switch, and no wire that was swapped.
+bool is_output(const v1::AxisState& axis, const std::string& terminal);
+
+/// The terminal was actuated and released: of the inputs exactly it became active and inactive again.
 Judgement judge_switch(const ExpectedInput& expected, const std::vector<v1::TerminalEdge>& edges);
 /// It is active although nobody actuates it.
 Judgement wrong_polarity(const ExpectedInput& expected);
@@ -90,6 +93,9 @@ struct LimitObservation {
   std::optional<v1::Command> away{};  ///< nothing: the operator left it out
   std::string away_left_out;          ///< why
 };
+/// The limit switch that became active by this edge in place of `expected`, with its function; empty: none
+/// did. Whatever else an axis passes on its way says nothing of the wires.
+std::string limit_instead(const v1::TerminalEdge& edge, const std::string& expected);
 /// Of the way to the switch alone.
 Judgement judge_limit_end(const LimitObservation& limit);
 Judgement judge_limit(const LimitObservation& limit);

@@ -55,6 +55,14 @@ TEST(JudgeSwitch, FailsWhereAnotherChangedToo) {
   EXPECT_EQ(judgement.reason, "X3 changed, too");
 }
 
+TEST(JudgeSwitch, KnowsOutputsByTheAxis) {
+  v1::AxisState axis;
+  axis.add_inputs()->set_name("X0");
+  axis.add_outputs()->set_name("Y0");
+  EXPECT_TRUE(is_output(axis, "Y0"));
+  EXPECT_FALSE(is_output(axis, "X0"));
+}
+
 TEST(JudgeSwitch, FailsWhereNothingChangedOrItHangs) {
   EXPECT_EQ(judge_switch(home, {}).reason, "no terminal changed");
   EXPECT_EQ(judge_switch(home, {edge("X0", true)}).reason, "X0 stayed active");
@@ -264,6 +272,14 @@ TEST(JudgeLimit, FailsWhereTheAxisWentOn) {
   EXPECT_EQ(judge_limit(seen).remedy, "was X1 released too early?");
   seen.command = command(v1::COMMAND_STATE_ERROR, v1::REASON_DID_NOT_START);
   EXPECT_EQ(judge_limit(seen).remedy, "let it move before the switch is actuated");
+}
+
+TEST(JudgeLimit, OnlyAnotherLimitSwitchIsInItsPlace) {
+  EXPECT_EQ(limit_instead(edge("X2", true, "negative_limit"), "X1"), "X2 (negative_limit)");
+  EXPECT_EQ(limit_instead(edge("X2", false, "negative_limit"), "X1"), "");
+  EXPECT_EQ(limit_instead(edge("X1", true, "positive_limit"), "X1"), "");
+  EXPECT_EQ(limit_instead(edge("X0", true, "home"), "X1"), "") << "passed on the way";
+  EXPECT_EQ(limit_instead(edge("X3", true), "X1"), "");
 }
 
 TEST(JudgeLimit, FailsWhereTheDirectionIsNotForbidden) {
