@@ -56,6 +56,15 @@ class Motion(ClientTest):
         self.assertTrue(self.calls("MoveAbsolute")[0].HasField("position"))
         self.assertFalse(self.calls("MoveAbsolute")[0].HasField("velocity"))
 
+    async def test_what_is_no_number_is_not_sent(self):
+        with self.assertRaisesRegex(axisd.ArgumentError, "position: '120mm' is no number; write it without a unit"):
+            await self.feeder.move("120mm")
+        with self.assertRaisesRegex(axisd.ArgumentError, "velocity: '5mm/s' is no number"):
+            await self.feeder.move_relative(5, velocity="5mm/s")
+        with self.assertRaisesRegex(axisd.ArgumentError, "feeder: '5' is no number"):
+            await self.machine.group(axes=["feeder"]).move({"feeder": "5"})
+        self.assertFalse(self.calls("MoveAbsolute") + self.calls("MoveRelative") + self.calls("MoveGroup"))
+
     async def test_move_relative(self):
         await self.feeder.set_position(100)
         await self.feeder.move_relative(-10)
@@ -382,8 +391,12 @@ class Errors(ClientTest):
                 axisd.connect(wrong)
 
     def test_certificates_belong_together(self):
-        with self.assertRaises(ValueError):
-            axisd.connect("localhost:1", tls_key="key.pem")
+        for given, wrong in (({"tls_key": "x"}, "tls_certificate and tls_key need tls_ca"),
+                             ({"tls_ca": "x", "tls_certificate": "x"}, "tls_certificate and tls_key belong together"),
+                             ({"tls_ca": "x", "tls_key": "x"}, "tls_certificate and tls_key belong together")):
+            for connect in (axisd.connect, axisd.connect_cell):
+                with self.assertRaisesRegex(axisd.ArgumentError, wrong):
+                    connect("localhost:1", **given)
 
 
 class Packaging(unittest.TestCase):

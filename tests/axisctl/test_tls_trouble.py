@@ -5,6 +5,7 @@ import subprocess
 import tempfile
 import threading
 import unittest
+import unittest.mock
 
 import grpc
 
@@ -164,6 +165,48 @@ class Trouble(unittest.IsolatedAsyncioTestCase):
                               timeout=LIMIT, check=False)
         self.assertEqual(done.returncode, 3, done)
         self.assertIn("the daemon speaks TLS; give --tls-ca", done.stderr)
+        for asks in (True, False):
+            async with axisd.connect(self.serve(asks=asks)) as machine:
+                with self.assertRaisesRegex(axisd.UnreachableError,
+                                            "the daemon speaks TLS; give tls_ca, tls_certificate and tls_key"):
+                    await machine.info()
+
+    async def test_of_a_daemon_that_is_away_nothing_is_said_of_tls(self):
+        async with axisd.connect("127.0.0.1:1") as machine:
+            with self.assertRaises(axisd.UnreachableError) as raised:
+                await machine.info()
+        self.assertNotIn("TLS", str(raised.exception))
+        self.assertTrue(raised.exception.nothing_sent)
+
+    def test_wrong_files_are_named_before_anything_is_sent(self):
+        good = {"tls_ca": "ours/ca.crt", "tls_certificate": "ours/shift-a.crt", "tls_key": "ours/shift-a.key"}
+        wrong = (("tls_ca", "nope", "tls_ca: cannot read '.*/nope': No such file or directory; give a PEM file"),
+                 ("tls_ca", "ours/shift-a.key", "tls_ca: there is no certificate in"),
+                 ("tls_certificate", "ours/shift-a.key", "tls_certificate: there is no certificate in"),
+                 ("tls_key", "ours/shift-a.crt", "tls_key: there is no private key in"))
+        for name, file, text in wrong:
+            files = {key: self.path(value) for key, value in (good | {name: file}).items()}
+            with self.assertRaisesRegex(axisd.ArgumentError, text):
+                axisd.connect("localhost:1", **files)
+
+    async def test_the_environment_names_the_files(self):
+        """Where the call names none: of a machine, and of the entrance of a cell."""
+        class Version(grpc.GenericRpcHandler):
+            def service(self, handler_call_details):
+                return grpc.unary_unary_rpc_method_handler(lambda request, context: b"")
+
+        server = self.serve(answers=(Version(),))
+        named = {"AXISD_TLS_CA": self.path("ours/ca.crt"), "AXISD_TLS_CERT": self.path("ours/shift-a.crt"),
+                 "AXISD_TLS_KEY": self.path("ours/shift-a.key")}
+        with unittest.mock.patch.dict("os.environ", named):
+            async with axisd.connect(server) as machine:
+                self.assertEqual((await machine.info()).version, "")
+            async with axisd.connect_cell(server) as cell:
+                self.assertEqual(await cell.machines(), {})
+            async with axisd.connect(server, tls_certificate=self.path("theirs/shift-a.crt"),
+                                     tls_key=self.path("theirs/shift-a.key")) as machine:
+                with self.assertRaisesRegex(axisd.UnreachableError, "does not take the certificate of tls_certificate"):
+                    await machine.info()
 
 
 if __name__ == "__main__":

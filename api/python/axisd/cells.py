@@ -3,7 +3,6 @@ from __future__ import annotations
 
 import contextlib
 import os
-import pathlib
 from collections.abc import AsyncGenerator, Mapping
 from types import TracebackType
 
@@ -18,16 +17,16 @@ from .cell_lease import CellLease, split
 from .cell_types import CellEvent, CellInfo, CellMachine, CellReleased, CellStopped
 from .drives import Cursor
 from .machine import Machine, channel_to
+from .tls_files import Path, TlsFiles
 
 
-def connect_cell(entrance: str | None = None, *, tls_ca: str | pathlib.Path | None = None,
-                 tls_certificate: str | pathlib.Path | None = None, tls_key: str | pathlib.Path | None = None,
-                 timeout: float = 10.0) -> Cell:
+def connect_cell(entrance: str | None = None, *, tls_ca: Path | None = None, tls_certificate: Path | None = None,
+                 tls_key: Path | None = None, timeout: float = 10.0) -> Cell:
     """A cell, by HOST:PORT of the entrance of any of its machines (without a port 7445), to be used as `async with`. Without
-    a name that of $AXISD_CELL, else localhost. Connects with the first call. `timeout` as of connect()."""
+    a name that of $AXISD_CELL, else localhost. Connects with the first call. `tls_ca`, `tls_certificate`, `tls_key` and `timeout` as of connect()."""
     if entrance is None:
         entrance = os.environ.get("AXISD_CELL") or "localhost"
-    return Cell(with_port(entrance, USUAL_CELL_PORT), tls_ca, tls_certificate, tls_key, timeout)
+    return Cell(with_port(entrance, USUAL_CELL_PORT), TlsFiles.given(tls_ca, tls_certificate, tls_key), timeout)
 
 
 class MemberMachine(Machine):
@@ -35,8 +34,7 @@ class MemberMachine(Machine):
     errors have its name in front. It is open as long as the cell is."""
 
     def __init__(self, cell: Cell, name: str, ordinary: grpc.aio.Channel, stops: grpc.aio.Channel) -> None:
-        authority, certificate, key = cell._entrance._tls
-        super().__init__(cell.server, authority, certificate, key, cell.timeout)
+        super().__init__(cell.server, cell._entrance._tls, cell.timeout)
         self.name = name
         self._member = name
         self._metadata = (("axisd-machine", name),)
@@ -53,12 +51,11 @@ class MemberMachine(Machine):
 class Cell:
     """The machines of a cell, through one entrance. Made by connect_cell()."""
 
-    def __init__(self, server: str, tls_ca: str | pathlib.Path | None, tls_certificate: str | pathlib.Path | None,
-                 tls_key: str | pathlib.Path | None, timeout: float) -> None:
+    def __init__(self, server: str, tls: TlsFiles, timeout: float) -> None:
         self.server = server
         self.timeout = timeout
         # How it is called, and what its errors say, is that of a machine.
-        self._entrance = Machine(server, tls_ca, tls_certificate, tls_key, timeout)
+        self._entrance = Machine(server, tls, timeout)
         self._entrance._member = ""
         self._channels: tuple[grpc.aio.Channel, grpc.aio.Channel] | None = None
         self._machines: dict[str, MemberMachine] = {}

@@ -5,7 +5,6 @@ import asyncio
 import contextlib
 import datetime
 import os
-import pathlib
 from collections.abc import AsyncGenerator, Iterable
 from types import TracebackType
 from typing import Any
@@ -29,6 +28,7 @@ from .kept_state import AllStopped, Conviction, KeptState
 from .lease import Lease, LeaseInfo
 from .reasons import Reason
 from .stop_lane import StopCalls, StopLane, stop_lane_of
+from .tls_files import Path, TlsFiles
 from .traffic import BusStatistics, FlightRecord, TracedFrame
 from .types import AxisState, Bus, Command, Info, Tick
 from .v1 import (audit_service_pb2, audit_service_pb2_grpc, axis_service_pb2, axis_service_pb2_grpc, bus_service_pb2,
@@ -66,45 +66,37 @@ _FIRST_PAUSE = 0.05
 _LONGEST_PAUSE = 0.5
 
 
-def connect(server: str | None = None, *, tls_ca: str | pathlib.Path | None = None,
-            tls_certificate: str | pathlib.Path | None = None, tls_key: str | pathlib.Path | None = None,
-            timeout: float = 10.0, stop_server: str | None = None, speak_for: str | None = None,
-            role: str | None = None) -> Machine:
+def connect(server: str | None = None, *, tls_ca: Path | None = None, tls_certificate: Path | None = None,
+            tls_key: Path | None = None, timeout: float = 10.0, stop_server: str | None = None,
+            speak_for: str | None = None, role: str | None = None) -> Machine:
     """A machine, by HOST, HOST:PORT or unix:PATH, to be used as `async with`. Without a name that of $AXISD_SERVER, else
     localhost; without a port 7443. Connects with the first call. `timeout` limits how long the daemon may take to answer,
     not how long a motion may take. Stops are repeated until then while the daemon cannot be reached. `stop_server`: its
-    stop lane; without it that of $AXISD_STOP_SERVER if `server` is not given either, else next to `server`. `speak_for`: of
-    a delegate: the person whom all calls are made for; `role`: what they may do ("viewer", "operator", "maintainer"), at
-    most what the delegate may."""
+    stop lane; without it that of $AXISD_STOP_SERVER if `server` is not given either, else next to `server`. `tls_ca`: use TLS;
+    the daemon's certificate is checked with this PEM file; the others are this client's own. Without them those of
+    $AXISD_TLS_CA, $AXISD_TLS_CERT and $AXISD_TLS_KEY. `speak_for`: of a delegate: the person whom all calls are made for;
+    `role`: what they may do ("viewer", "operator", "maintainer"), at most what the delegate may. Raises ArgumentError."""
     if server is None:
         server = os.environ.get("AXISD_SERVER") or "localhost"
         # Never beside a server that was named: another machine's lane would stop another machine's axis.
         if stop_server is None:
             stop_server = os.environ.get("AXISD_STOP_SERVER")
-    return Machine(with_port(server, USUAL_PORT), tls_ca, tls_certificate, tls_key, timeout,
+    return Machine(with_port(server, USUAL_PORT), TlsFiles.given(tls_ca, tls_certificate, tls_key), timeout,
                    with_port(stop_server, USUAL_STOP_PORT) if stop_server else None, speak_for, role)
 
 
 class Machine:
     """One daemon. Made by connect()."""
 
-    def __init__(self, server: str, tls_ca: str | pathlib.Path | None, tls_certificate: str | pathlib.Path | None,
-                 tls_key: str | pathlib.Path | None, timeout: float, stop_server: str | None = None,
+    def __init__(self, server: str, tls: TlsFiles, timeout: float, stop_server: str | None = None,
                  speak_for: str | None = None, role: str | None = None) -> None:
-        def read(path: str | pathlib.Path | None) -> bytes | None:
-            return pathlib.Path(path).read_bytes() if path is not None else None
-
-        if tls_ca is None and (tls_certificate is not None or tls_key is not None):
-            raise ValueError("tls_certificate and tls_key need tls_ca")
         if role is not None and speak_for is None:
             raise ValueError("role needs speak_for: one's own is the daemon's to say")
         self.server = server
         self.stop_server = stop_server
         self.timeout = timeout
-        self._tls = (tls_ca, tls_certificate, tls_key)
-        self._credentials = None
-        if tls_ca is not None:
-            self._credentials = grpc.ssl_channel_credentials(read(tls_ca), read(tls_key), read(tls_certificate))
+        self._tls = tls
+        self._credentials = tls.credentials()
         claim = {"axisd-user": speak_for, "axisd-role": role}
         self._metadata = tuple((key, value) for key, value in claim.items() if value is not None)
         self._channels: list[grpc.aio.Channel] = []
@@ -140,10 +132,7 @@ class Machine:
     async def _in_words(self, error: UnreachableError, subject: str) -> UnreachableError:
         """The same error, with what is wrong with the certificates where it is that: behind its own words where something
         may have been sent."""
-        authority, certificate, key = self._tls
-        if authority is None:
-            return error
-        why = await asyncio.to_thread(tls_trouble.why, self.server, authority, certificate, key)
+        why = await asyncio.to_thread(tls_trouble.why, self.server, self._tls)
         if why is None:
             return error
         if not error.nothing_sent:

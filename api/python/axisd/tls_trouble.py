@@ -2,13 +2,12 @@
 from __future__ import annotations
 
 import datetime
-import os
 import socket
 import ssl
 import time
 from typing import Any
 
-Path = str | os.PathLike[str]
+from .tls_files import Path, TlsFiles
 
 _PATIENCE = 1.0
 # Of OpenSSL; ssl has no name for the first.
@@ -113,16 +112,29 @@ def _daemon(address: tuple[str, int], tls_ca: Path, certificate: Path | None, ke
     return "the daemon does not take the certificate of tls_certificate; give one of an authority that it trusts"
 
 
-def why(server: str, tls_ca: Path, certificate: Path | None, key: Path | None) -> str | None:
+def _without_tls(address: tuple[str, int]) -> str | None:
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+    context.check_hostname = False
+    context.verify_mode = ssl.CERT_NONE  # nothing is said to it
+    try:
+        _shake_hands(address, context)
+    except ssl.SSLError as error:
+        if "ALERT" not in (error.reason or ""):  # that is TLS, too: it wants a certificate, say
+            return None
+    return "the daemon speaks TLS; give tls_ca, tls_certificate and tls_key"
+
+
+def why(server: str, tls: TlsFiles) -> str | None:
     """What is wrong with the certificates of either side, in a line; None: nothing that is seen. Connects to see what
     the daemon shows: waits for some seconds at most."""
     host, _, port = server.rpartition(":")
-    if certificate is not None and key is not None and (own := _own(certificate, key)):
+    if tls.certificate is not None and tls.key is not None and (own := _own(tls.certificate, tls.key)):
         return own
     if server.startswith("unix:") or not port.isdecimal():
         return None
+    address = (host.strip("[]"), int(port))
     try:
-        return _daemon((host.strip("[]"), int(port)), tls_ca, certificate, key)
+        return _without_tls(address) if tls.ca is None else _daemon(address, tls.ca, tls.certificate, tls.key)
     except ssl.SSLCertVerificationError as error:
         if error.verify_code in _UNKNOWN_AUTHORITY:
             return "the daemon's certificate is not signed by an authority of tls_ca; give that of this machine"
