@@ -86,7 +86,8 @@ class FakeMachine(FakeDrives, FakeNodes, FakeEvents, FakeGroups, FakeLeases, Fak
             await refuse(context, grpc.StatusCode.UNAVAILABLE, offline_detail())
         if self.inhibited and powered:
             await refuse(context, grpc.StatusCode.FAILED_PRECONDITION, error_pb2.ErrorDetail(
-                reason=error_pb2.REASON_INHIBITED, message="all axes are stopped", remedy="release the stop first"))
+                reason=error_pb2.REASON_INHIBITED, message="all axes are stopped",
+                remedy="release it: axisctl release-stop --all"))
         if powered:
             await self.accepted(context)
         if powered and not axis.state.enabled:

@@ -6,6 +6,7 @@ from unittest import mock
 
 import fake_cell
 import axisd
+from axisd.types import in_cell
 
 LIMIT = 60
 
@@ -85,6 +86,11 @@ class Axes(CellTest):
             await self.cell.axis("press-9/feeder").state()
         with self.assertRaisesRegex(axisd.RefusedError, "offline|does not answer"):
             await self.cell.axis("press-1/ghost").enable()  # a drive, and no machine
+        await self.cell.machine("press-2").stop_all()
+        with self.assertRaises(axisd.RefusedError) as refused:
+            await self.cell.axis("press-2/feeder").move(5)
+        self.assertIn("axisctl --machine press-2 release-stop --all", str(refused.exception))
+        self.assertEqual(refused.exception.remedy, refused.exception.detail.remedy)
         for name in ("feeder", "/feeder", "press-2/"):
             with self.assertRaises(axisd.ArgumentError):
                 self.cell.axis(name)
@@ -115,7 +121,6 @@ class Axes(CellTest):
             self.assertEqual(axisd.connect_cell().server, "press-7:7445")
 
 
-
 class Groups(CellTest):
     async def test_axes_of_several_machines_move_from_one_moment_on(self):
         async with self.cell.lease("press-1/feeder", "press-2/feeder") as lease:
@@ -142,6 +147,20 @@ class Groups(CellTest):
         self.assertTrue(lost.exception.nothing_sent)
         with self.assertRaises(axisd.ArgumentError):
             await self.cell.move({"feeder": 10})
+
+
+class Advice(unittest.TestCase):
+    def test_it_is_given_for_the_entrance(self):
+        for told, meant in {
+                "look at it; axisctl reset feeder": "look at it; axisctl reset press-2/feeder",
+                "acquire one: axisctl lease acquire feeder, and give its token":
+                    "acquire one: axisctl lease acquire press-2/feeder, and give its token",
+                "accept it: axisctl state, axisctl state accept":
+                    "accept it: axisctl --machine press-2 state, axisctl --machine press-2 state accept",
+                "axisctl machines shows those of the cell": "axisctl machines shows those of the cell",
+                "check its power": "check its power"}.items():
+            self.assertEqual(in_cell(told, "press-2", "feeder"), meant)
+        self.assertEqual(in_cell("axisctl home home", "press-2", "home"), "axisctl home press-2/home")
 
 
 class StopAll(CellTest):

@@ -73,6 +73,10 @@ class PythonExamples(unittest.TestCase):
             self.assertIn("DiscreteMotion", output)
             self.assertRegex(output, rf"{axes[model]} \({model}\) rests at [\d.]+ \w+, position Homed\n\Z")
 
+    def test_a_deadman_button_needs_somebody_to_hold_it(self):
+        process = self.start("deadman_jog.py", "turntable", stdin=subprocess.DEVNULL)
+        self.assertIn("the button is a pipe or a terminal", self.finish(process, 2))
+
     def test_a_deadman_button(self):
         process = self.start("deadman_jog.py", "turntable", "--velocity", 30, stdin=subprocess.PIPE, bufsize=1)
 

@@ -3,17 +3,18 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import dataclasses
 import uuid
 from collections.abc import AsyncGenerator, Iterable
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
-from .calls import Seconds, command_options, did_you_mean, done, duration
+from .calls import Seconds, command_options, did_you_mean, done, duration, number
 from .drive import Drive
 from .errors import ArgumentError, AxisdError, MotionError, RefusedError
 from .holds import StopHold
 from .reasons import Reason
-from .types import AxisState, Command, Link, Obstacle
+from .types import AxisState, Command, Link, Obstacle, in_cell
 from .v1 import axis_service_pb2, system_service_pb2, types_pb2
 
 if TYPE_CHECKING:
@@ -91,7 +92,8 @@ class Axis:
                    request_id: str | None = None) -> Command:
         """Moves to a position."""
         request = axis_service_pb2.MoveAbsoluteRequest(
-            axis=self.name, position=position, velocity=velocity, acceleration_time=duration(acceleration_time),
+            axis=self.name, position=number("position", position), velocity=number("velocity", velocity),
+            acceleration_time=duration(acceleration_time),
             deceleration_time=duration(deceleration_time), options=command_options(request_id, wait, buffered))
         return await self._command(self._machine._axes.MoveAbsolute, request, wait)
 
@@ -100,7 +102,8 @@ class Axis:
                             wait: bool = True, buffered: bool = False, request_id: str | None = None) -> Command:
         """Moves by a distance."""
         request = axis_service_pb2.MoveRelativeRequest(
-            axis=self.name, distance=distance, velocity=velocity, acceleration_time=duration(acceleration_time),
+            axis=self.name, distance=number("distance", distance), velocity=number("velocity", velocity),
+            acceleration_time=duration(acceleration_time),
             deceleration_time=duration(deceleration_time), options=command_options(request_id, wait, buffered))
         return await self._command(self._machine._axes.MoveRelative, request, wait)
 
@@ -109,7 +112,8 @@ class Axis:
                        wait: bool = False, request_id: str | None = None) -> Command:
         """Moves at a velocity until something ends it; with `hold`, until it is not repeated in time."""
         request = axis_service_pb2.MoveVelocityRequest(
-            axis=self.name, velocity=velocity, hold=duration(hold), acceleration_time=duration(acceleration_time),
+            axis=self.name, velocity=number("velocity", velocity), hold=duration(hold),
+            acceleration_time=duration(acceleration_time),
             deceleration_time=duration(deceleration_time), options=command_options(request_id, wait))
         return await self._command(self._machine._axes.MoveVelocity, request, wait)
 
@@ -193,6 +197,7 @@ class Axis:
         for name, argument in given.items():
             if argument is not None and name not in _EXPLAINED.get(command or "", ()):
                 raise ArgumentError(f"{name} does not belong to {command or 'motion in general'}", "leave it out")
+        value, velocity = number("value", value), number("velocity", velocity)
         ramps = {"acceleration_time": duration(acceleration_time), "deceleration_time": duration(deceleration_time)}
         if command == "move":
             request.move_absolute.CopyFrom(
@@ -210,7 +215,9 @@ class Axis:
         elif command is not None:
             getattr(request, command).SetInParent()
         response = await self._machine._call(self._machine._system.Explain, request, self.name)
-        return [Obstacle.of(obstacle) for obstacle in response.obstacles]
+        told = [Obstacle.of(obstacle) for obstacle in response.obstacles]
+        member = self._machine._member
+        return [dataclasses.replace(one, remedy=in_cell(one.remedy, member, self.name)) for one in told] if member else told
 
     async def reset(self, *, wait: bool = True, request_id: str | None = None) -> Command:
         """Leaves ErrorStop if the cause is gone. Never moves."""
@@ -219,7 +226,7 @@ class Axis:
 
     async def set_position(self, position: float, *, wait: bool = True, request_id: str | None = None) -> Command:
         """Declares the present position; at standstill only."""
-        request = axis_service_pb2.SetPositionRequest(axis=self.name, position=position,
+        request = axis_service_pb2.SetPositionRequest(axis=self.name, position=number("position", position),
                                                       options=command_options(request_id, wait))
         return await self._command(self._machine._axes.SetPosition, request, wait)
 
@@ -233,7 +240,7 @@ class Jog:
         self._axis = axis
         self._hold = hold
         self._arguments: dict[str, Any] = {
-            "axis": axis.name, "velocity": velocity, "hold": duration(hold),
+            "axis": axis.name, "velocity": number("velocity", velocity), "hold": duration(hold),
             "acceleration_time": duration(acceleration_time), "deceleration_time": duration(deceleration_time)}
         self._request_id = str(uuid.uuid4())
         self._renewal: asyncio.Task[None] | None = None

@@ -5,14 +5,16 @@ import datetime
 import difflib
 import uuid
 from collections.abc import Iterable
+from typing import TypeVar
 
 from google.protobuf.duration_pb2 import Duration
 
-from .errors import MotionError
+from .errors import ArgumentError, MotionError
 from .types import Command, CommandState
 from .v1 import types_pb2
 
 Seconds = float | datetime.timedelta
+_Number = TypeVar("_Number")
 
 
 def duration(value: Seconds | None) -> Duration | None:
@@ -22,6 +24,13 @@ def duration(value: Seconds | None) -> Duration | None:
     message = Duration()
     message.FromTimedelta(delta)
     return message
+
+
+def number(argument: str, value: _Number) -> _Number:
+    """What protobuf takes for a number. Raises ArgumentError: it is a text, say."""
+    if value is None or hasattr(value, "__float__"):
+        return value
+    raise ArgumentError(f"{argument}: {value!r} is no number", "write it without a unit: the axis's own is meant")
 
 
 def names(axes: Iterable[str]) -> list[str]:

@@ -85,12 +85,14 @@ class MotionError(AxisdError):
     """A motion was accepted and ended Aborted, Error or Unknown. `command` is how it ended; `machine`: where, in a cell."""
 
     def __init__(self, command: Command, machine: str = "") -> None:
+        told = command.cause.of_member(machine, command.axis) if command.cause and machine else command.cause
         # The daemon's text may name the axis as well; once is enough.
-        cause = ": " + str(command.cause).removeprefix(f"{command.axis}: ") if command.cause else ""
+        cause = ": " + str(told).removeprefix(f"{command.axis}: ") if told else ""
         axis = f"{machine}/{command.axis}" if machine else command.axis
         super().__init__(f"{axis}: {command.kind} {command.state.value}{cause}")
         self.command = command
         self.machine = machine
+        self._told = told
 
     @property
     def reason(self) -> Reason:
@@ -98,7 +100,7 @@ class MotionError(AxisdError):
 
     @property
     def remedy(self) -> str:
-        return self.command.cause.remedy if self.command.cause else ""
+        return self._told.remedy if self._told else ""
 
 
 def detail_of(error: grpc.aio.AioRpcError) -> ErrorDetail | None:
@@ -125,6 +127,7 @@ def translate(error: grpc.aio.AioRpcError, subject: str, server: str, request_id
     detail = detail_of(error)
     bare = f"{subject}: " if subject else ""
     if machine:
+        detail = detail.of_member(machine, subject) if detail is not None else None
         subject = f"{machine}/{subject}" if subject else machine
     lead = f"{subject}: " if subject else ""
     text = error.details() or error.code().name

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import grpc
 
-from .calls import Seconds, did_you_mean, duration
+from .calls import Seconds, did_you_mean, duration, number
 from .errors import ArgumentError, AxisdError, MotionError, RefusedError, StopError
 from .holds import StopHold
 from .reasons import Outcome, Reason
@@ -135,11 +135,11 @@ class Group:
             target = request.targets.add(axis=axis, acceleration_time=duration(acceleration_time),
                                          deceleration_time=duration(deceleration_time))
             if relative:
-                target.distance = value
+                target.distance = number(axis, value)
             else:
-                target.position = value
+                target.position = number(axis, value)
             if velocity is not None and axis in velocity:
-                target.velocity = velocity[axis]
+                target.velocity = number(f"velocity of {axis}", velocity[axis])
         added = set() if self.name else set(targets) - self._targets
         self._targets |= added
         try:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import datetime
 import enum
+import re
 from typing import Any
 
 from google.protobuf.duration_pb2 import Duration
@@ -103,6 +104,18 @@ class PermittedRange:
         return f"{self.minimum:g} to {self.maximum:g} {self.unit}".rstrip()
 
 
+def in_cell(remedy: str, machine: str, axis: str) -> str:
+    """A machine's advice for whoever asks through the entrance of its cell: "axisctl reset feeder" is
+    "axisctl reset press-2/feeder" there, and "axisctl state" is "axisctl --machine press-2 state"."""
+    def named(command: re.Match[str]) -> str:
+        verb, words = command[1], command[2]
+        # An axis may be called as a command is.
+        full = re.sub(rf"(?<=\s){re.escape(axis)}(?![\w/-])", f"{machine}/{axis}", words) if axis else words
+        return f"axisctl {verb}{full}" if full != words else f"axisctl --machine {machine} {verb}{words}"
+
+    return re.sub(r"axisctl (?!machines\b)([a-z-]*[a-z])((?: [^,;:'()]*)?)", named, remedy)
+
+
 @dataclasses.dataclass(frozen=True)
 class ErrorDetail:
     """What happened, where, and what to do."""
@@ -126,6 +139,10 @@ class ErrorDetail:
             _optional(raw, "node"), _optional(raw, "object"), _optional(raw, "native_code"),
             PermittedRange(permitted.minimum, permitted.maximum, permitted.unit) if raw.HasField("permitted") else None,
             raw)
+
+    def of_member(self, machine: str, axis: str) -> ErrorDetail:
+        """As what a machine of a cell says of this axis."""
+        return dataclasses.replace(self, remedy=in_cell(self.remedy, machine, axis))
 
     def __str__(self) -> str:
         text = self.message or self.reason.replace("_", " ")

@@ -6,6 +6,8 @@ coming, for whatever reason, the axis halts. When this program hangs or dies, th
 """
 import argparse
 import asyncio
+import os
+import stat
 import sys
 
 import axisd
@@ -65,4 +67,6 @@ if __name__ == "__main__":
     parser.add_argument("axis")
     parser.add_argument("--velocity", type=float, default=5.0, help="signed, in the axis's unit per second")
     arguments = parser.parse_args()
+    if not sys.stdin.isatty() and not stat.S_ISFIFO(os.fstat(sys.stdin.fileno()).st_mode):
+        parser.error("the button is a pipe or a terminal at the standard input")
     asyncio.run(main(arguments.axis, arguments.velocity))
