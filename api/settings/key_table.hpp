@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cstdint>
+#include <expected>
 #include <optional>
 #include <set>
 #include <span>
@@ -35,8 +36,8 @@ struct Key {
   std::int64_t minimum = 0, maximum = 0;  ///< of a number; of a duration in ms
 };
 
-/// The whole file; nothing: it cannot be read, or is empty. Blocks for the disk.
-[[nodiscard]] std::optional<std::string> text_of_file(const std::string& path);
+/// The whole file. Errors: why not, for people; an empty one counts as such. Blocks for the disk.
+[[nodiscard]] std::expected<std::string, std::string> text_of_file(const std::string& path);
 
 /// The entries of a section, each key once. `wrong`: what is told of anything else.
 template <class Read>

@@ -6,6 +6,7 @@ import pathlib
 import socket
 import ssl
 import struct
+import subprocess
 import unittest
 
 from certificates import Certificates
@@ -200,7 +201,8 @@ class Loopback(WebScenario):
 
     def test_another_gateway_at_the_same_address_is_an_error(self):
         second = self.web()
-        pathlib.Path(second.config).write_text(f"listen: localhost:{self.gateway.port}\nusers: {second.users}\n")
+        pathlib.Path(second.config).write_text(f"listen: localhost:{self.gateway.port}\nusers: {second.users}\n"
+                                               f"files: {second.page}\n")
         done = run([AXISD_WEB, "--config", second.config])
         self.assertEqual(done.returncode, 1, done)
         self.assertIn("nothing else listens there", done.stderr)
@@ -212,6 +214,34 @@ class Loopback(WebScenario):
         done = run([AXISD_WEB, "--config", second.config, "--check"])
         self.assertEqual((done.returncode, len(done.stderr.splitlines())), (2, 2), done)
         self.assertIn("unknown key 'listn'; did you mean 'listen'?", done.stderr)
+
+    def test_a_check_finds_what_a_start_would(self):
+        other = self.web()
+        check = [AXISD_WEB, "--config", other.config, "--check"]
+        good = pathlib.Path(other.config).read_text()
+        self.assertEqual(run(check).returncode, 0)
+        for changed, told in (
+                (good.replace(f"files: {other.page}", "files: /nothere"), "/nothere: cannot be read: No such file"),
+                (good.replace(f"files: {other.page}", f"files: {other.page}/assets"), "no page of axisd-web is there; check 'files'"),
+                (good.replace("axisd: {", "axisd: { tls: { ca: /nothere.crt, certificate: /y, key: /z },"),
+                 "/nothere.crt: cannot be read; check axisd.tls"),
+                ("", "is empty")):
+            pathlib.Path(other.config).write_text(changed)
+            for words in (check, check[:-1]):
+                done = run(words)
+                self.assertEqual(done.returncode, 2, done)
+                self.assertIn(told, done.stderr)
+        pathlib.Path(other.config).unlink()
+        self.assertIn("cannot be read: No such file or directory", run(check).stderr)
+
+    def test_a_user_needs_a_password(self):
+        words = [AXISD_WEB, "--config", self.gateway.config, "user"]
+        done = subprocess.run([*words, "add", "shift-a", "--role", "operator"], stdin=subprocess.DEVNULL, capture_output=True,
+                              text=True, check=False, timeout=LIMIT)
+        self.assertEqual((done.returncode, done.stdout), (2, ""))
+        self.assertIn("no password was given: type it, or write it as the first line", done.stderr)
+        self.assertEqual(self.gateway.user("add", "shift-a", "--role", "operator", password="correct horse"),
+                         "shift-a  operator\n")
 
 
 class Persons(WebScenario):

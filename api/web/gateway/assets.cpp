@@ -53,7 +53,6 @@ Result<Assets> Assets::load(const std::string& directory) {
   namespace fs = std::filesystem;
   Assets assets;
   std::error_code error;
-  if (!fs::is_directory(directory, error)) return assets;
   std::map<std::string, std::string, std::less<>> files;
   std::size_t size = 0;
   for (auto entry = fs::recursive_directory_iterator(directory, error);
@@ -66,7 +65,12 @@ Result<Assets> Assets::load(const std::string& directory) {
     files.emplace('/' + entry->path().lexically_relative(directory).generic_string(),
                   read_file(entry->path()));
   }
-  if (error) return fail(Reason::storage, fmt::format("{}: cannot be read: {}", directory, error.message()));
+  if (error)
+    return fail(Reason::invalid_argument, fmt::format("{}: cannot be read: {}", directory, error.message()),
+                "check 'files' in the configuration");
+  if (!files.contains(index_path))
+    return fail(Reason::invalid_argument, fmt::format("{}: no page of axisd-web is there", directory),
+                "check 'files' in the configuration");
   for (auto& [path, content] : files) {
     if (path.ends_with(".gz")) continue;
     const auto gzip = files.find(path + ".gz");

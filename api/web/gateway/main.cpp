@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "api/program/program.hpp"
+#include "api/transport/channel.hpp"
 #include "api/web/gateway/gateway.hpp"
 #include "api/web/gateway/listener.hpp"
 #include "api/web/gateway/options.hpp"
@@ -48,6 +49,12 @@ Result<Ground> prepare(const Settings& settings) {
   if (!people) return fail(std::move(people).error());
   auto assets = Assets::load(settings.files);
   if (!assets) return fail(std::move(assets).error());
+  // All machines are called with the same.
+  const auto& axisd = settings.axisd;
+  if (const auto trusted = transport::client_credentials(
+          {.ca = axisd.ca, .certificate = axisd.certificate, .key = axisd.key}, "axisd.tls");
+      !trusted)
+    return fail(trusted.error());
   Ground ground{.people = *std::move(people), .assets = *std::move(assets), .tls = {}, .client_ca = {}};
   if (!settings.tls) return ground;
   auto tls = make_tls(*settings.tls);

@@ -182,7 +182,7 @@ LoadedSettings read_settings(std::string_view text, const std::string& file_name
 
 LoadedSettings load_settings(const std::string& path) {
   const auto text = settings::text_of_file(path);
-  if (!text) return {{}, {{path, 0, 0, "cannot be read, or is empty", "deploy/web.yaml is an example"}}};
+  if (!text) return {{}, {{path, 0, 0, text.error(), "deploy/web.yaml is an example"}}};
   return read_settings(*text, path);
 }
 

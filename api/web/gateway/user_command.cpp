@@ -51,6 +51,8 @@ int complain(std::string_view what) {
 std::optional<std::string> new_password() {
   const Hidden hidden;
   auto password = asked(hidden.terminal(), "Password: ");
+  if (!password)
+    complain("no password was given: type it, or write it as the first line of the standard input");
   if (!password || !hidden.terminal()) return password;
   if (asked(true, "Once more: ") != password) {
     complain("that was not the same");
@@ -72,6 +74,10 @@ std::string new_hash() {
   return hash;
 }
 
+std::string line_of(const User& user) {
+  return fmt::format("{}  {}{}\n", user.name, user.role, user.hash.empty() ? "  by certificate" : "");
+}
+
 int save(const std::string& path, const Users& users) {
   if (const auto saved = save_users(path, users); !saved) return complain(axisd::to_string(saved.error()));
   return 0;
@@ -84,9 +90,7 @@ int run_user_command(const Options::UserCommand& command, const std::string& pat
   auto users = load_users(path);
   if (!users) return complain(axisd::to_string(users.error()));
   if (command.kind == Options::UserCommand::Kind::list) {
-    for (const auto& user : *users)
-      std::cout << fmt::format("{}  {}{}\n", user.name, user.role,
-                               user.hash.empty() ? "  by certificate" : "");
+    for (const auto& user : *users) std::cout << line_of(user);
     return 0;
   }
   const auto gone = std::erase_if(*users, [&](const User& user) { return user.name == command.name; });
@@ -98,7 +102,9 @@ int run_user_command(const Options::UserCommand& command, const std::string& pat
       .name = command.name, .role = command.role, .hash = command.certificate ? std::string() : new_hash()};
   if (!command.certificate && user.hash.empty()) return 2;
   users->push_back(std::move(user));
-  return save(path, *users);
+  if (const int failed = save(path, *users); failed != 0) return failed;
+  std::cout << line_of(users->back());
+  return 0;
 }
 
 }  // namespace axisd::web

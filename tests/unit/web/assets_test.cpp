@@ -34,9 +34,15 @@ TEST(Assets, AreFoundByTheirPaths) {
     EXPECT_EQ(assets.find(path), nullptr) << path;
 }
 
-TEST(Assets, MayBeMissing) {
-  const auto none = Assets::load("/nowhere").value();
-  EXPECT_EQ(none.find("/"), nullptr);
+TEST(Assets, AFolderWithoutAPageIsAnError) {
+  const auto none = Assets::load("/nowhere");
+  ASSERT_FALSE(none);
+  EXPECT_EQ(none.error().message, "/nowhere: cannot be read: No such file or directory");
+  const test::TemporaryDirectory directory;
+  directory.write("other.html", "<html>");
+  const auto other = Assets::load(directory.path().string());
+  ASSERT_FALSE(other);
+  EXPECT_EQ(other.error().message, directory.path().string() + ": no page of axisd-web is there");
 }
 
 }  // namespace
