@@ -234,6 +234,14 @@ class Loopback(WebScenario):
         pathlib.Path(other.config).unlink()
         self.assertIn("cannot be read: No such file or directory", run(check).stderr)
 
+    def test_a_daemon_that_is_away_is_told_once(self):
+        self.subject.daemon.terminate()
+        away = f"axisd does not answer at unix:{self.subject.socket}: "
+        wait_for(lambda: away in self.gateway.program.log(), "it tells")
+        self.subject.start_daemon()
+        wait_for(lambda: "axisd answers at " in self.gateway.program.log().partition(away)[2], "it tells of its return")
+        self.assertEqual(self.gateway.program.log().count(away), 1)
+
     def test_a_user_needs_a_password(self):
         words = [AXISD_WEB, "--config", self.gateway.config, "user"]
         done = subprocess.run([*words, "add", "shift-a", "--role", "operator"], stdin=subprocess.DEVNULL, capture_output=True,
@@ -242,6 +250,18 @@ class Loopback(WebScenario):
         self.assertIn("no password was given: type it, or write it as the first line", done.stderr)
         self.assertEqual(self.gateway.user("add", "shift-a", "--role", "operator", password="correct horse"),
                          "shift-a  operator\n")
+
+    def test_a_daemon_that_does_not_let_it_speak_for_others_is_told_once(self):
+        self.gateway.user("add", "anna", "--role", "operator", password="correct horse")
+        page = Page(self.gateway)
+        wait_for(lambda: page.log_in("anna", "correct horse")[0] == 204, "the user is known")
+        for _ in range(2):
+            status, message, detail = page.call("AxisService/GetAxis", axis_pb.GetAxisRequest(axis="spinner"),
+                                                axis_pb.GetAxisResponse)
+            self.assertEqual((status, detail.reason), (7, error_pb.REASON_ACCESS_DENIED), message)
+            self.assertTrue(detail.remedy)
+        told = f"refuses whoever has logged in: {OWN_NAME} may not speak for others; "
+        self.assertEqual(self.gateway.program.log().count(told), 1, self.gateway.program.log())
 
 
 class Persons(WebScenario):

@@ -41,12 +41,19 @@ Gateway::Gateway(boost::asio::io_context& context, Clock& time, const Settings& 
       sessions(session_limits(said), [this](const Session& session) { end_session(session.id); }),
       lines_(lines) {
   if (!client_ca.empty()) identities_.emplace(client_ca);
-  tick();
+  tick_later();
+}
+
+void Gateway::tick_later() {
+  timer_ = clock.call_at(clock.now() + tick_period, [this] { tick(); });
 }
 
 void Gateway::tick() {
-  timer_ = clock.call_at(clock.now() + tick_period, [this] { tick(); });
-  for (const auto& [name, upstream] : machines) upstream->stay_connected();
+  tick_later();
+  for (const auto& [name, upstream] : machines) {
+    upstream->tell_trouble();
+    upstream->stay_connected();
+  }
   sessions.expire(clock.now());
   const bool others = people.refresh();
   sessions.end_if(

@@ -92,6 +92,7 @@ class Gateway {
 
  private:
   void tick();
+  void tick_later();
   void end_session(std::uint64_t id);
   [[nodiscard]] std::optional<Known> by_certificate(const std::string& certificate) const;
   /// Whether somebody without a session would be let in as they are.

@@ -20,8 +20,9 @@ struct CallStatus {
 /// Codes of gRPC that the gateway uses itself.
 namespace code {
 inline constexpr int cancelled = 1, unknown = 2, invalid_argument = 3, deadline_exceeded = 4, not_found = 5,
-                     resource_exhausted = 8, failed_precondition = 9, unimplemented = 12, internal = 13,
-                     unavailable = 14, data_loss = 15, unauthenticated = 16;
+                     permission_denied = 7, resource_exhausted = 8, failed_precondition = 9,
+                     unimplemented = 12, internal = 13, unavailable = 14, data_loss = 15,
+                     unauthenticated = 16;
 }  // namespace code
 
 inline constexpr std::string_view grpc_web_type = "application/grpc-web+proto";

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 #include <grpcpp/create_channel.h>
+#include <spdlog/spdlog.h>
 
 #include <boost/asio/post.hpp>
 #include <utility>
@@ -15,6 +16,13 @@ namespace {
 std::vector<std::pair<std::string, std::string>> metadata_of(const Person& person) {
   if (person.how == How::loopback) return {};
   return {{"axisd-user", person.name}, {"axisd-role", person.role}};
+}
+
+/// gRPC's text for a failed connection is a list of wrapped errors, the last one being the reason.
+std::string_view innermost(std::string_view text) {
+  constexpr std::string_view mark = "last error: ";
+  if (const auto at = text.rfind(mark); at != text.npos) text.remove_prefix(at + mark.size());
+  return text;
 }
 
 /// Another address may have what this one has not. What the daemon itself says has details.
@@ -49,6 +57,11 @@ Upstream::Upstream(boost::asio::any_io_executor executor, const Clock& clock, co
 
 std::shared_ptr<Call> Upstream::start(const std::string& path, std::string_view message, const Person& person,
                                       std::optional<Duration> timeout, Call::Events events) {
+  if (person.how != How::loopback)
+    events.done = [this, done = std::move(events.done)](CallStatus status) {
+      note_answer(status);
+      done(std::move(status));
+    };
   return Call::start(
       executor_, *main_.stub,
       {.path = path, .message = to_buffer(message), .metadata = metadata_of(person), .timeout = timeout},
@@ -169,18 +182,46 @@ void Upstream::stay_connected() {
   for (auto* link : {&main_, &lane_}) {
     if (link->channel->GetState(true) == GRPC_CHANNEL_READY || link->probing) continue;
     link->probing = true;
+    link->why.clear();
     (void)ask_at(*link, link->probe, {}, {.name = {}, .role = {}, .how = How::loopback},
-                 std::chrono::seconds(1),
-                 [link](const CallStatus&, const std::string&) { link->probing = false; });
+                 std::chrono::seconds(1), [link](const CallStatus& status, const std::string&) {
+                   link->probing = false;
+                   link->why = innermost(status.message);
+                 });
   }
 }
 
+const Upstream::Link* Upstream::broken() const {
+  for (const auto* link : {&main_, &lane_})
+    if (link->channel->GetState(false) != GRPC_CHANNEL_READY) return link;
+  return nullptr;
+}
+
 std::string Upstream::trouble() const {
-  if (main_.channel->GetState(false) != GRPC_CHANNEL_READY)
-    return fmt::format("axisd does not answer at {}", settings_.server);
-  if (lane_.channel->GetState(false) != GRPC_CHANNEL_READY)
-    return fmt::format("the stop lane of axisd does not answer at {}", settings_.stop_server);
-  return {};
+  const auto* link = broken();
+  if (link == nullptr) return {};
+  return link == &main_ ? fmt::format("axisd does not answer at {}", settings_.server)
+                        : fmt::format("the stop lane of axisd does not answer at {}", settings_.stop_server);
+}
+
+void Upstream::tell_trouble() {
+  const auto now = trouble();
+  // What lasts from one look to the next: by then it is known why, and a daemon that is restarted is back.
+  if (std::exchange(trouble_seen_, now) != now || now == trouble_told_) return;
+  trouble_told_ = now;
+  if (const auto* link = broken(); link != nullptr)
+    spdlog::warn("{}{}{}", trouble_told_, link->why.empty() ? "" : ": ", link->why);
+  else
+    spdlog::info("axisd answers at {}", settings_.server);
+}
+
+void Upstream::note_answer(const CallStatus& status) {
+  // Whatever a person asks for is refused then: it is the daemon's configuration that is wrong.
+  if (refusal_told_ || status.code != code::permission_denied ||
+      !status.message.contains("may not speak for others"))
+    return;
+  refusal_told_ = true;
+  spdlog::warn("axisd at {} refuses whoever has logged in: {}", settings_.server, status.message);
 }
 
 }  // namespace axisd::web

@@ -51,6 +51,8 @@ class Upstream {
   void stay_connected();
   /// Empty: everything can be asked for.
   [[nodiscard]] std::string trouble() const;
+  /// Logs when trouble() has changed, and not only for a moment. To be called every second or so.
+  void tell_trouble();
   /// Calls that are not over.
   [[nodiscard]] int open() const { return open_; }
 
@@ -62,11 +64,14 @@ class Upstream {
     std::unique_ptr<grpc::GenericStub> stub;
     std::string probe{};  ///< a call that changes nothing
     bool probing = false;
+    std::string why{};  ///< what the last one ended with
   };
   Upstream(boost::asio::any_io_executor executor, const Clock& clock, const DaemonSettings& settings,
            const std::shared_ptr<grpc::ChannelCredentials>& trusted);
   std::shared_ptr<Call> ask_at(Link& link, std::string path, std::string_view message, const Person& person,
                                Duration timeout, Done done);
+  [[nodiscard]] const Link* broken() const;
+  void note_answer(const CallStatus& status);
   void press(LaneMethod method, std::string_view message, const Person& person, Duration timeout, Done done);
   void start_at_main(LaneMethod method, std::string_view message, const Person& person, Duration timeout,
                      Done done);
@@ -90,6 +95,8 @@ class Upstream {
   };
   std::map<std::uint64_t, Press> presses_;  ///< at the stop lane
   std::uint64_t last_press_ = 0;
+  std::string trouble_seen_{}, trouble_told_{};  ///< at the last look; as it was logged last
+  bool refusal_told_ = false;                    ///< that the daemon does not let this speak for others
 };
 
 }  // namespace axisd::web

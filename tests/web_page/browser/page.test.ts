@@ -4,6 +4,8 @@ import { readFileSync } from 'node:fs';
 import { after, before, test } from 'node:test';
 import type { Browser, Page } from 'playwright-core';
 import { Role } from '@proto/access_pb';
+import { Reason } from '@proto/error_pb';
+import { refusal } from '../mock/axis';
 import { assertReachable, closeAll, launch, open, ready, until, violations } from './support';
 
 let browser: Browser;
@@ -326,6 +328,22 @@ test('without a stream nothing is shown as live', async () => {
   await page.locator('.banner.alarm').waitFor();
   gateway.world.silent = false;
   await until(async () => !/stale/.test((await row.getAttribute('class'))!), 'the values are live again', 15_000);
+  await opened.close();
+});
+
+test('a page that the daemon refuses says so, with what to do', async () => {
+  const opened = await open(browser);
+  const { page, gateway } = opened;
+  await page.locator('tr[data-axis="feeder"]').waitFor();
+  gateway.world.refusal = refusal(Reason.ACCESS_DENIED, 'web may not speak for others', 'name web under access: delegates in the configuration');
+  await page.reload();
+  const banner = page.locator('.banner.alarm', { hasText: 'The daemon refuses this page.' });
+  await banner.waitFor();
+  assert.match((await banner.locator('.detail').textContent())!, /^web may not speak for others; name web under access: delegates/);
+  assert.doesNotMatch((await banner.textContent())!, /is lost/);
+  assert.match((await page.locator('header').textContent())!, /shift-a$/);
+  gateway.world.refusal = undefined;
+  await page.locator('tr[data-axis="feeder"]:not(.stale)').waitFor({ timeout: 15_000 });
   await opened.close();
 });
 

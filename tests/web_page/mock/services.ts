@@ -1,7 +1,7 @@
 // The services of the contract, over the machine that is made up.
 import { create, fromBinary, toBinary, type DescService } from '@bufbuild/protobuf';
 import { DurationSchema as DurationOf, timestampFromMs, type Duration } from '@bufbuild/protobuf/wkt';
-import type { ConnectRouter, ServiceImpl } from '@connectrpc/connect';
+import { Code, type ConnectRouter, type ServiceImpl } from '@connectrpc/connect';
 import { Role } from '@proto/access_pb';
 import { AxisService } from '@proto/axis_service_pb';
 import { BusBudgetSchema, type BusBudget } from '@proto/budget_pb';
@@ -12,7 +12,7 @@ import { GroupMoveSchema, GroupSchema, GroupService, type GroupMove } from '@pro
 import { LeaseSchema, LeaseService } from '@proto/lease_service_pb';
 import { ObstacleSchema, SystemService } from '@proto/system_service_pb';
 import { LeaseChangeKind } from '@proto/event_service_pb';
-import { Reason } from '@proto/error_pb';
+import { Reason, type ErrorDetail } from '@proto/error_pb';
 import { CommandKind, CommandOptionsSchema as CommandOptionsOf, CommandState, State } from '@proto/types_pb';
 import { refusal } from './axis';
 import { Refused, type FakeLease, type FakeMachine } from './machine';
@@ -32,6 +32,8 @@ export interface World {
   streams: number;
   /** While set, streams of states stand still. */
   silent: boolean;
+  /** While set, streams of states are refused so: the gateway may not speak for others. */
+  refusal?: ErrorDetail;
 }
 
 function budgets(machine: FakeMachine): BusBudget[] {
@@ -95,6 +97,7 @@ export function serve(router: ConnectRouter, world: World): LaneCalls {
     listAxes: () => ({ axes: [...machine.axes.values()].map((axis) => axis.snapshot(Date.now())) }),
     getAxis: ({ axis }) => ({ state: machine.axis(axis).snapshot(Date.now()) }),
     async *watchAxes({ period }, { signal }) {
+      if (world.refusal !== undefined) throw new Refused(world.refusal, Code.PermissionDenied);
       world.streams += 1;
       try {
         for (let tick = 1n; !signal.aborted; ++tick) {

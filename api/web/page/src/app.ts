@@ -46,6 +46,11 @@ export const states = keepOpen(wanted, async (signal, live) => {
 
 let cursor: { instanceId: string; afterSequence: bigint } = { instanceId: '', afterSequence: 0n };
 
+/** Why the states were lost, as the daemon says it; undefined: they are not, or nothing is known. */
+export const lostBy = computed(() => (states.state.value === 'lost' && states.why.value !== undefined ? problem(states.why.value) : undefined));
+/** The daemon takes nothing from this page: what is lost is no connection. */
+export const refused = computed(() => lostBy.value?.reason === Reason.ACCESS_DENIED);
+
 export const happenings = keepOpen(wanted, async (signal, live) => {
   for await (const message of clients.events.watchEvents(cursor, { signal })) {
     live();

@@ -24,6 +24,7 @@ export const de: Texts = {
   'live.none': 'Nichts ist aktuell.',
   'live.connecting': 'Warten auf die Maschine. Falls das dauert: andere Fenster dieser Seite schließen, ein Browser hat wenige Verbindungen.',
   'live.lost': 'Die Verbindung zur Maschine ist verloren; sie wird von selbst neu versucht.',
+  'live.refused': 'Der Dienst weist diese Seite ab.',
   'live.old': '{age} alt',
   'page.no-axes': 'Es gibt keine Achsen.',
   'page.nothing-live': 'Nichts ist aktuell: Die Seite hört nichts von der Maschine.',

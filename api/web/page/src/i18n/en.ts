@@ -23,6 +23,7 @@ export const en = {
   'live.none': 'Nothing is live.',
   'live.connecting': 'Waiting for the machine. If this lasts, close other windows of this page: a browser has few connections.',
   'live.lost': 'The connection to the machine is lost; it is tried again by itself.',
+  'live.refused': 'The daemon refuses this page.',
   'live.old': '{age} old',
   'page.no-axes': 'There are no axes.',
   'page.nothing-live': 'Nothing is live: the page does not hear from the machine.',

@@ -24,6 +24,7 @@ export const zh: Texts = {
   'live.none': '没有实时数据。',
   'live.connecting': '正在等待机器。如果持续很久，请关闭本页面的其他窗口：浏览器的连接数有限。',
   'live.lost': '与机器的连接已断开，正在自动重试。',
+  'live.refused': '守护进程拒绝本页面。',
   'live.old': '{age} 前的值',
   'page.no-axes': '没有轴。',
   'page.nothing-live': '没有实时数据：页面收不到机器的消息。',

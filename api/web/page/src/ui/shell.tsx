@@ -1,12 +1,11 @@
 // What is around every screen: head, navigation, stops, and what was said last.
 import { Role } from '@proto/access_pb';
-import { lane, laneTakes, states, store, leases, endControl } from '../app';
+import { lane, laneTakes, states, store, leases, endControl, lostBy, refused } from '../app';
 import { LANE_MS } from '../hold/machine';
 import { clockFormat, t } from '../i18n';
 import { roleKey } from '../i18n/names';
 import { places, route, go, hrefOf, lastAxis, machine } from '../route';
 import { session } from '../transport/session';
-import { problem } from '../transport/clients';
 import { Dialog } from './dialog';
 import { dismiss, notices, type Text } from './notices';
 import { askReleaseAll } from './questions';
@@ -37,7 +36,8 @@ function Head() {
       <Fact>{t('head.axes', { count: store.names.value.length })}</Fact>
       {store.statistics.value.map(({ bus, utilisation }) => <Fact key={bus} label={bus}>{Math.round(utilisation * 100)} %</Fact>)}
       <LaneFact />
-      {who !== null && <Fact>{info?.client || who.name}{role !== null && info?.role !== Role.UNSPECIFIED && ` (${t(role)})`}</Fact>}
+      {/* Where the page is refused, what the daemon tells is of axisd-web itself. */}
+      {who !== null && <Fact>{refused.value ? who.name : <>{info?.client || who.name}{role !== null && info?.role !== Role.UNSPECIFIED && ` (${t(role)})`}</>}</Fact>}
     </header>
   );
 }
@@ -72,8 +72,10 @@ function Banners() {
     <>
       {!live && (
         <div class="banner alarm" role="alert">
-          <b>{t('live.none')}</b> <span>{states.state.value === 'connecting' ? t('live.connecting') : t('live.lost')}</span>
-          {states.why.value !== undefined && states.state.value === 'lost' && <span class="detail">{problem(states.why.value).message}</span>}
+          {refused.value
+            ? <b>{t('live.refused')}</b>
+            : <><b>{t('live.none')}</b> <span>{states.state.value === 'connecting' ? t('live.connecting') : t('live.lost')}</span></>}
+          {lostBy.value !== undefined && <span class="detail">{lostBy.value.message}{lostBy.value.remedy !== '' && `; ${lostBy.value.remedy}`}</span>}
           <button class="button" onClick={() => states.retry()}>{t('action.reconnect')}</button>
         </div>
       )}
