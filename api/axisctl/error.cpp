@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <utility>
 
+#include "api/axisctl/advice.hpp"
 #include "api/axisctl/format.hpp"
 #include "api/axisctl/machine_names.hpp"
 
@@ -144,7 +145,7 @@ std::optional<v1::ErrorDetail> detail_of(const grpc::Status& status) {
 }
 
 std::string describe(const v1::ErrorDetail& detail, std::string_view subject) {
-  std::string message = detail.message();
+  std::string message = in_own_words(detail.message());
   // Of an axis of a cell a machine says its own name, and the entrance that of the machine.
   for (const auto& name : {subject, without_machine(subject), machine_in(subject)})
     if (const std::string lead = fmt::format("{}: ", name); message.starts_with(lead))
@@ -159,7 +160,7 @@ std::string describe(const v1::ErrorDetail& detail, std::string_view subject) {
     text += fmt::format(" (permitted {} to {}{}{})", number(detail.permitted().minimum()),
                         number(detail.permitted().maximum()), detail.permitted().unit().empty() ? "" : " ",
                         detail.permitted().unit());
-  if (!detail.remedy().empty()) text += "; " + detail.remedy();
+  if (!detail.remedy().empty()) text += "; " + advice(detail.remedy(), subject);
   return text;
 }
 
@@ -176,6 +177,13 @@ Failure failure_of(const grpc::Status& status, std::string_view subject, std::st
     return {ExitCode::unreachable,
             fmt::format("{}no answer from {} at {} in time; --timeout sets how long to wait", lead,
                         program(asked), server)};
+  if (status.error_code() == grpc::StatusCode::UNIMPLEMENTED && asked == Asked::entrance)
+    return {
+        ExitCode::refused,
+        fmt::format(
+            "{}{} is no entrance of a cell, or is of another version than this axisctl; an axisd is called "
+            "by --server",
+            lead, server)};
   if (status.error_code() == grpc::StatusCode::UNIMPLEMENTED)
     return {ExitCode::refused, fmt::format("{}the daemon at {} does not offer this function: {}; compare the "
                                            "versions of both (axisctl info, axisctl --version)",

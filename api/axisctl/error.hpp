@@ -56,8 +56,8 @@ void complain(const Failure& failure, bool as_json);
 /// The typed detail of the grpc-status-details-bin trailer, if the daemon sent one.
 std::optional<v1::ErrorDetail> detail_of(const grpc::Status& status);
 
-/// One line: address, message, permitted range, remedy. A message that begins with `subject` loses that: the
-/// caller names it already.
+/// One line: address, message, permitted range, remedy, in words of axisctl. A message that begins with
+/// `subject` loses that: the caller names it already.
 std::string describe(const v1::ErrorDetail& detail, std::string_view subject = {});
 
 /// Who was connected to.

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "api/axisctl/advice.hpp"
 #include "api/axisctl/error.hpp"
 #include "api/axisctl/format.hpp"
 #include "api/axisctl/terminal.hpp"
@@ -31,7 +32,7 @@ std::string explanation(const v1::ExplainResponse& response, std::string_view ax
                                             : coloured("note   ", Colour::yellow, colour),
                         reason, describe(what_it_is, axis));
     if (!obstacle.detail().remedy().empty())
-      text += fmt::format("          -> {}\n", obstacle.detail().remedy());
+      text += fmt::format("          -> {}\n", advice(obstacle.detail().remedy(), axis));
   }
   return text;
 }

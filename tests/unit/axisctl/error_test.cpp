@@ -162,6 +162,23 @@ TEST(Failures, ASilentMachineIsUnreachableAndADriveIsNot) {
   EXPECT_EQ(of(Asked::entrance).code(), ExitCode::refused);
 }
 
+TEST(Failures, ADaemonIsNoEntrance) {
+  const grpc::Status status(grpc::StatusCode::UNIMPLEMENTED, "");
+  EXPECT_THAT(failure_of(status, "", "press-1:7443", false, Asked::entrance).what(),
+              HasSubstr("press-1:7443 is no entrance of a cell, "));
+  EXPECT_THAT(failure_of(status, "", "press-1:7443", false).what(),
+              HasSubstr("does not offer this function"));
+}
+
+TEST(Failures, AdviceIsThatOfAxisctl) {
+  auto detail = soft_limit();
+  detail.clear_permitted();
+  detail.set_remedy("then axisctl reset feeder");
+  EXPECT_THAT(describe(detail, "press-2/feeder"), HasSubstr("; then axisctl reset press-2/feeder"));
+  detail.set_message("options.not_after passed 0.1 s before the request arrived");
+  EXPECT_THAT(describe(detail), HasSubstr("what --valid-for gives was over 0.1 s before"));
+}
+
 TEST(Failures, AnEntranceThatIsNotThereHasARemedyOfItsOwn) {
   const grpc::Status status(grpc::StatusCode::UNAVAILABLE,
                             "failed to connect to all addresses; last error: Connection refused");
