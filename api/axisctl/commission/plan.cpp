@@ -174,10 +174,10 @@ Motion default_motion(VelocityRange permitted, const std::optional<Settings>& se
   return motion;
 }
 
-double proving_velocity(VelocityRange permitted, std::optional<double> wanted, double distance) {
+double proving_velocity(VelocityRange permitted, double usual, double distance) {
   const double tenth = permitted.maximum * share_of_proof;
   const double slow = std::max(std::min(tenth, distance / proof_seconds), permitted.minimum);
-  return std::min(slow, wanted.value_or(slow));
+  return std::min(slow, usual);
 }
 
 double bounded(double wanted, bool positive, const v1::AxisState& state,

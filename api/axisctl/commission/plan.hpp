@@ -60,9 +60,10 @@ struct VelocityRange {
 Motion default_motion(VelocityRange permitted, const std::optional<Settings>& settings,
                       std::optional<double> velocity, std::optional<double> distance);
 
-/// Of a move that proves the speed: a tenth of the highest velocity, slower where the way would be over too
-/// soon to be timed, at least what the drive can do, and not faster than the operator wants.
-double proving_velocity(VelocityRange permitted, std::optional<double> wanted, double distance);
+/// Of the move that proves the speed, before which nothing is faster: that of the moves behind it (`usual`),
+/// at most a tenth of the highest; slower where the way would be over too soon to be timed, but what the
+/// drive can do.
+double proving_velocity(VelocityRange permitted, double usual, double distance);
 
 /// How far the axis may go from here in one relative move: at most `wanted`, not beyond a soft limit that
 /// counts, and not further than jog_travel while the position is unknown. Not negative.

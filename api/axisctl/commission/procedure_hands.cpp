@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "api/axisctl/advice.hpp"
 #include "api/axisctl/commission/procedure.hpp"
 #include "api/axisctl/commission/record.hpp"
 #include "api/axisctl/error.hpp"
@@ -87,15 +88,15 @@ Judgement Procedure::identity(Step& step) {
     detail.clear_remedy();
     return {.verdict = VERDICT_FAILED,
             .reason = describe(detail, axis_.name()),
-            .remedy = first->detail().remedy()};
+            .remedy = advice(first->detail().remedy(), axis_.name())};
   }
   plan_motion();
-  permit(fmt::format("Is this the axis that you stand at? Moves will be {} at {}, the first at {}, and "
-                     "nothing moves before you say yes to it. Go on?",
-                     with_unit(motion_.distance, record_.unit()),
-                     with_unit(motion_.velocity, record_.unit() + "/s"),
-                     with_unit(proving_velocity(velocities_, wishes_.velocity, motion_.distance),
-                               record_.unit() + "/s")),
+  permit(fmt::format(
+             "Is this the axis that you stand at? Moves will be {} at {}, the first, which is timed, at {}, "
+             "and nothing moves before you say yes to it. Go on?",
+             with_unit(motion_.distance, record_.unit()), with_unit(motion_.velocity, record_.unit() + "/s"),
+             with_unit(proving_velocity(velocities_, motion_.velocity, motion_.distance),
+                       record_.unit() + "/s")),
          step);
   return {};
 }

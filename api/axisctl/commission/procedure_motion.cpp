@@ -66,7 +66,7 @@ Judgement Procedure::jog(const StepPlan& plan, Step& step) {
   if (room <= 0) throw StepEnd(VERDICT_NOT_DONE, no_room(before), room_remedy(before));
   const double distance = plan.positive ? room : -room;
   const bool proves = record_.speed() != SPEED_PROOF_PROVEN;
-  const double velocity = proves ? proving_velocity(velocities_, wishes_.velocity, room) : motion_.velocity;
+  const double velocity = proves ? proving_velocity(velocities_, motion_.velocity, room) : motion_.velocity;
   check_move(distance, velocity);
   const bool in_one_frame = settings_ && settings_->starts_in_one_frame;
   permit(fmt::format("{}{}.{} Look at the machine; Enter stops it. Move?",

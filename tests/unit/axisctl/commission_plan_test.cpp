@@ -213,12 +213,12 @@ TEST(Motion, IsSlowAndShort) {
 }
 
 TEST(Motion, ThatProvesTheSpeedIsATenthOfTheHighestAndLastsASecond) {
-  EXPECT_DOUBLE_EQ(proving_velocity(permitted, {}, 10), 10);
-  EXPECT_DOUBLE_EQ(proving_velocity(permitted, {}, 200), 10);
-  EXPECT_DOUBLE_EQ(proving_velocity(permitted, {}, 4), 4);
+  EXPECT_DOUBLE_EQ(proving_velocity(permitted, 5, 10), 5) << "nothing is faster than what is not proven yet";
+  EXPECT_DOUBLE_EQ(proving_velocity(permitted, 5, 4), 4);
+  EXPECT_DOUBLE_EQ(proving_velocity(permitted, 20, 10), 10);
   EXPECT_DOUBLE_EQ(proving_velocity(permitted, 20, 200), 10);
   EXPECT_DOUBLE_EQ(proving_velocity(permitted, 2, 200), 2);
-  EXPECT_DOUBLE_EQ(proving_velocity({.minimum = 30, .maximum = 100}, {}, 10), 30);
+  EXPECT_DOUBLE_EQ(proving_velocity({.minimum = 30, .maximum = 100}, 40, 10), 30);
 }
 
 TEST(Motion, IsBoundedByWhatIsKnown) {
