@@ -86,14 +86,19 @@ void collect(const Message& message, Demand& demand) {
   }
 }
 
-std::unexpected<Error> denied(const Caller& caller, const Demand& demand, Role has, std::string_view where) {
+/// `most`: what a delegate may lend.
+std::string way_to_role(const Caller& caller, Role needed, Role most) {
+  if (!caller.lent)
+    return fmt::format("ask somebody who has it, or give {} that role under access: in the configuration",
+                       caller.identity);
+  if (most >= needed) return fmt::format("ask with {}: {}", role_key, to_string(needed));
+  return fmt::format("give {} that role under access: delegates in the configuration", caller.identity);
+}
+
+std::unexpected<Error> denied(const AccessSettings& access, const Caller& caller, const Demand& demand,
+                              Role has, std::string_view where) {
   const auto needed = to_string(demand.role);
-  auto remedy = caller.lent ? fmt::format("ask with {}: {}, or give {} that role under access: delegates",
-                                          role_key, needed, caller.identity)
-                            : fmt::format(
-                                  "ask somebody who has it, or give {} that role under access: in "
-                                  "the configuration",
-                                  caller.identity);
+  auto remedy = way_to_role(caller, demand.role, in(access.delegates, caller.identity));
   return fail(
       Reason::access_denied,
       fmt::format("{} needs the role {}{}{}; {} has {}", demand.call, needed, where.empty() ? "" : " on ",
@@ -188,11 +193,11 @@ Result<void> permits(const AccessSettings& access, const Caller& caller, const D
                      std::span<const std::string> axes) {
   for (const auto& axis : axes)
     if (const auto has = role_of(&access, caller, axis); has < demand.role)
-      return denied(caller, demand, has, axis);
+      return denied(access, caller, demand, has, axis);
   if (!axes.empty()) return {};
   const auto has = role_of(&access, caller);
   if (has >= demand.role || (demand.anywhere && has_somewhere(access, caller, demand.role))) return {};
-  return denied(caller, demand, has, {});
+  return denied(access, caller, demand, has, {});
 }
 
 Result<Caller> admitted(const AccessSettings* access, const Peer& peer, const Claim& claim,

@@ -210,8 +210,13 @@ TEST(Access, ADelegateSpeaksForOthersAndGivesNoMoreThanItHas) {
   v1::EnableRequest enable;
   enable.set_axis("feeder");
   EXPECT_TRUE(admitted(&access, web, {.user = "shift-a"}, enable, {}));
-  EXPECT_THAT(admitted(&access, web, {.user = "shift-a", .role = "viewer"}, enable, {}).error().remedy,
-              HasSubstr("ask with axisd-role: operator"));
+  EXPECT_EQ(admitted(&access, web, {.user = "shift-a", .role = "viewer"}, enable, {}).error().remedy,
+            "ask with axisd-role: operator");
+  EXPECT_EQ(admitted(&access, web, {.user = "shift-a", .role = "maintainer"}, v1::ReloadConfigRequest(), {})
+                .error()
+                .remedy,
+            "give web that role under access: delegates in the configuration")
+      << "it has asked for it already";
   EXPECT_FALSE(admitted(&access, web, {}, enable, {})) << "for itself it has none";
   EXPECT_EQ(admitted(&access, anna, {.user = "shift-a"}, v1::StopRequest(), {})->name, "anna")
       << "a stop is taken as one's own";
