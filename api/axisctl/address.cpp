@@ -25,6 +25,12 @@ bool is_port(std::string_view text) {
   return error == std::errc{} && behind == text.data() + text.size() && port != 0;
 }
 
+/// Of gRPC's own addresses, "dns:press-1".
+bool is_scheme(std::string_view text) {
+  constexpr std::string_view known[] = {"dns", "ipv4", "ipv6", "unix-abstract", "vsock"};
+  return std::ranges::find(known, text) != std::end(known);
+}
+
 }  // namespace
 
 std::string with_port(const std::string& address, std::uint16_t port) {
@@ -35,7 +41,7 @@ std::string with_port(const std::string& address, std::uint16_t port) {
   const auto colon = bracketed ? std::string::npos : address.rfind(':');
   if (colon == std::string::npos) return fmt::format("{}:{}", address, port);
   const auto behind = std::string_view(address).substr(colon + 1);
-  if (behind.find_first_not_of("0123456789") == behind.npos && !is_port(behind))
+  if (!is_port(behind) && !is_scheme(std::string_view(address).substr(0, colon)))
     throw Failure(ExitCode::usage, fmt::format("'{}': a port is a number from 1 to 65535", address));
   return address;
 }

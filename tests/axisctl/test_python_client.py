@@ -386,7 +386,7 @@ class Errors(ClientTest):
         self.assertEqual(axisd.connect("press-1", stop_server="press-1").stop_server, "press-1:7444")
         self.assertIsNone(axisd.connect("press-1").stop_server)
         self.assertEqual(axisd.connect_cell("press-1").server, "press-1:7445")
-        for wrong in ("press-1:65536", "press-1:0", "press-1:", "[::1]:70000"):
+        for wrong in ("press-1:65536", "press-1:0", "press-1:", "[::1]:70000", "press-1:abc"):
             with self.assertRaises(ValueError):
                 axisd.connect(wrong)
 

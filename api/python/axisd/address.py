@@ -7,6 +7,8 @@ import re
 USUAL_PORT, USUAL_STOP_PORT = 7443, 7444
 #: Of the entrance of a cell.
 USUAL_CELL_PORT = 7445
+# Of gRPC's own addresses, "dns:press-1".
+_SCHEMES = ("dns", "ipv4", "ipv6", "unix-abstract", "vsock")
 
 
 def with_port(address: str, port: int) -> str:
@@ -19,7 +21,7 @@ def with_port(address: str, port: int) -> str:
         return address
     if bracketed or ":" not in address:
         return f"{address}:{port}"
-    behind = address.rpartition(":")[2]
-    if not behind or (re.fullmatch(r"[0-9]+", behind) and not 0 < int(behind) <= 65535):
+    before, _, behind = address.rpartition(":")
+    if before not in _SCHEMES and not (re.fullmatch(r"[0-9]{1,5}", behind) and 0 < int(behind) <= 65535):
         raise ValueError(f"{address!r}: a port is a number from 1 to 65535")
     return address
