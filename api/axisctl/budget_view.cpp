@@ -65,6 +65,12 @@ Table stop_table(const v1::BusBudget& budget) {
   return table;
 }
 
+bool is_later_for_fewer(const v1::BusBudget& budget) {
+  return std::ranges::adjacent_find(budget.stops(), [](const auto& fewer, const auto& more) {
+           return seconds(fewer.standstill()) > seconds(more.standstill()) && seconds(more.standstill()) > 0;
+         }) != budget.stops().end();
+}
+
 /// How many of a group's axes are on this bus.
 int count_here(const v1::Group& group, const v1::BusBudget& budget) {
   const auto is_here = [&budget](const std::string& name) {
@@ -126,6 +132,9 @@ std::string budget_text(const v1::BusBudget& budget, const v1::ListGroupsRespons
     text += '\n' + joined(stop_table(budget), place);
     if (leaves_out(static_cast<std::uint32_t>(budget.stops_size())))
       text += "MOVING, STOPPED: not all numbers of axes are shown; --json has them\n";
+    if (is_later_for_fewer(budget))
+      text +=
+          "STANDSTILL: of fewer axes it may come later, as the others may start, and are read meanwhile\n";
     text += fmt::format("\n{}{}\n{}", group_text(budget, groups, place), joined(refresh_table(budget), place),
                         joined(axis_stop_table(budget), place));
   }

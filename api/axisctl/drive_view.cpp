@@ -5,6 +5,8 @@
 #include <fnmatch.h>
 
 #include <algorithm>
+#include <cstdint>
+#include <limits>
 
 #include "api/axisctl/error.hpp"
 #include "api/axisctl/format.hpp"
@@ -16,6 +18,16 @@ namespace {
 
 std::string line(std::string_view name, std::string_view value) {
   return value.empty() ? "" : fmt::format("{:<14}{}\n", fmt::format("{}:", name), value);
+}
+
+/// What a data sheet leaves out is as much as its type holds: no limit of the drive's.
+std::string speed_limits(const v1::GetDriveResponse& drive) {
+  constexpr auto most = static_cast<std::uint32_t>(std::numeric_limits<std::int32_t>::max());
+  std::string text;
+  if (drive.maximum_rpm() < most) text = fmt::format("{} r/min", drive.maximum_rpm());
+  if (drive.maximum_pulse_rate_hz() < most)
+    text += fmt::format("{}{} pulses/s", text.empty() ? "" : ", ", drive.maximum_pulse_rate_hz());
+  return text.empty() ? "none in its file" : text;
 }
 
 std::string names_of(const google::protobuf::RepeatedPtrField<v1::TerminalCapability>& terminals) {
@@ -112,15 +124,15 @@ std::string drive_details(const v1::GetDriveResponse& drive) {
                                                                                       : "");
   text += line("watchdog", drive.communication_watchdog() ? "of the communication"
                                                           : "none: the drive does not notice a cut cable");
-  text += line("limits",
-               fmt::format("{} r/min, {} pulses/s", drive.maximum_rpm(), drive.maximum_pulse_rate_hz()));
+  text += line("limits", speed_limits(drive));
   text += line("pulses/rev", fmt::format("{}", fmt::join(drive.pulses_per_revolution(), ", ")));
   text += line("homing", homing_methods(drive.homing_methods()));
   text += line("segments", std::to_string(drive.maximum_segments()));
   text += line("inputs", terminals(drive.inputs()));
   text += line("outputs", terminals(drive.outputs()));
   text += line("bauds", fmt::format("{}", fmt::join(drive.bauds(), ", ")));
-  text += line("EEPROM", fmt::format("{} registers saved from here{}", drive.eeprom_writes(),
+  text += line("EEPROM", fmt::format("{} register{} saved from here{}", drive.eeprom_writes(),
+                                     drive.eeprom_writes() == 1 ? "" : "s",
                                      drive.persist() ? "; the configuration says persist" : ""));
   for (const auto& alarm : drive.alarms())
     text += line(fmt::format("alarm {}", alarm_text(alarm.code())),

@@ -66,6 +66,13 @@ TEST(BudgetView, GroupsHaveWhatTheirAxesOnTheBusHave) {
   EXPECT_THAT(budget_text(line_with(5), {}, false), Not(HasSubstr("GROUP")));
 }
 
+TEST(BudgetView, SaysWhyAStopOfFewerAxesMayTakeLonger) {
+  auto budget = line_with(3);
+  EXPECT_THAT(budget_text(budget, {}, false), Not(HasSubstr("STANDSTILL: ")));
+  *budget.mutable_stops(0)->mutable_standstill() = TimeUtil::MillisecondsToDuration(882);
+  EXPECT_THAT(budget_text(budget, {}, false), HasSubstr("STANDSTILL: of fewer axes it may come later"));
+}
+
 TEST(BudgetView, NoBoundIsNoWay) {
   auto budget = line_with(1);
   auto& axis = *budget.mutable_axes(0);
