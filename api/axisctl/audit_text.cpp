@@ -67,6 +67,13 @@ std::string text_of(const v1::RecoveredCommand& recovered) {
                      recovered.sent() ? "may have been" : "was not");
 }
 
+/// `client`: who is shown in front already.
+std::string text_of(const v1::Event& event, const std::string& client) {
+  const auto& command = event.command_change().command();
+  return event.has_command_change() && command.client() == client ? command_line(command, "")
+                                                                  : axisctl::content_text(event);
+}
+
 std::string text_of(const v1::DaemonRun& run) {
   return fmt::format("axisd {} {} (start {})", run.version(),
                      run.kind() == v1::DAEMON_RUN_KIND_BEGAN ? "began" : "ended", run.start_count());
@@ -75,7 +82,7 @@ std::string text_of(const v1::DaemonRun& run) {
 std::string content_text(const v1::AuditRecord& record) {
   switch (record.content_case()) {
     case v1::AuditRecord::kEvent:
-      return axisctl::content_text(record.event());
+      return text_of(record.event(), record.client());
     case v1::AuditRecord::kRefused:
       return text_of(record.refused());
     case v1::AuditRecord::kCall:

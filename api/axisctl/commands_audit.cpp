@@ -1,5 +1,6 @@
 // audit, report: who asked for what, and what became of it.
 #include <fmt/format.h>
+#include <google/protobuf/util/time_util.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -9,6 +10,7 @@
 #include <limits>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -21,10 +23,14 @@
 #include "api/axisctl/quantity.hpp"
 #include "api/axisctl/terminal.hpp"
 #include "axisd/v1/audit_service.grpc.pb.h"
+#include "axisd/v1/axis_service.grpc.pb.h"
 #include "axisd/v1/drive_service.grpc.pb.h"
+#include "axisd/v1/group_service.grpc.pb.h"
 
 namespace axisd::axisctl {
 namespace {
+
+using google::protobuf::util::TimeUtil;
 
 /// Between two looks at what is new.
 constexpr std::chrono::milliseconds look_again{500};
@@ -67,6 +73,21 @@ void read(Client& client, v1::ListAuditRequest& request,
   }
 }
 
+/// "; 'feedr' is no axis or group now" for the first of these names that is none; nothing: each is one.
+std::string not_there_now(Client& client, const std::vector<std::string>& names) {
+  if (names.empty()) return {};
+  std::set<std::string> known;
+  for (const auto& axis :
+       client.call(&v1::AxisService::Stub::ListAxes, v1::ListAxesRequest(), std::string_view()).axes())
+    known.insert(axis.axis());
+  for (const auto& group :
+       client.call(&v1::GroupService::Stub::ListGroups, v1::ListGroupsRequest(), std::string_view()).groups())
+    known.insert(group.name());
+  for (const auto& name : names)
+    if (!known.contains(name)) return fmt::format("; '{}' is no axis or group now", name);
+  return {};
+}
+
 void audit(Invocation& invocation, const Arguments& arguments) {
   v1::ListAuditRequest request;
   for (const auto& axis : arguments.axes) request.add_axes(axis);
@@ -82,7 +103,8 @@ void audit(Invocation& invocation, const Arguments& arguments) {
   };
   if (!arguments.follow) {
     read(client, request, show);
-    if (!any && !invocation.json) print_line("the audit has no such record");
+    if (!any && !invocation.json)
+      print_line("the audit has no such record" + not_there_now(client, arguments.axes));
     return;
   }
   const Interrupt interrupt([] {});
@@ -113,7 +135,8 @@ void report(Invocation& invocation, const std::string& axis, const std::string& 
   }
   for (const auto& line : counted.lines(unit)) print_line(line);
   print_line(fmt::format("{:<18}{} since the axis was first configured here", "", writes));
-  print_line(first ? "since " + audit_line(*first) : "the audit has no record of the axis");
+  print_line(first ? "counted since " + TimeUtil::ToString(first->at())
+                   : "the audit has no record of the axis");
 }
 
 void add_audit(CLI::App& app, Invocation& invocation) {
@@ -122,8 +145,12 @@ void add_audit(CLI::App& app, Invocation& invocation) {
       "Who asked for what and what became of it: commands, refusals, changes of parameters, faults, "
       "leases, held stops, StopAll, configurations, over restarts of the daemon");
   const auto arguments = std::make_shared<Arguments>();
-  command->add_option("AXIS", arguments->axes,
-                      "Names of axes and groups; none: all, and what concerns a bus or the machine");
+  command
+      ->add_option("AXIS", arguments->axes,
+                   "Names of axes and groups, with spaces or commas between; none: all, and what concerns a "
+                   "bus or the "
+                   "machine")
+      ->delimiter(',');
   command
       ->add_option(
           "--kind", arguments->kinds,
@@ -138,9 +165,10 @@ void add_audit(CLI::App& app, Invocation& invocation) {
       ->delimiter(',');
   auto* since = command
                     ->add_option("--since", arguments->since,
-                                 "Only records behind a number, or younger than a time (10min)")
+                                 "Only records behind a number, or younger than a time (10min, 8h, 7d)")
                     ->type_name("WHEN");
   command->add_option("-n,--last", arguments->last, "Look at the newest so many records only")
+      ->check(CLI::Validator(CLI::PositiveNumber).description(""))
       ->excludes(since);
   command->add_flag("--follow", arguments->follow, "Go on with new records until Ctrl-C");
   command->footer(R"(
@@ -162,7 +190,7 @@ void add_audit_commands(CLI::App& app, Invocation& invocation) {
   command->add_option("AXIS", *axis, "Name of the axis")->required();
   command
       ->add_option("--since", *since,
-                   "Only what is younger than a time (480min), or behind a record's number")
+                   "Only what is younger than a time (8h, 7d), or behind a record's number")
       ->type_name("WHEN");
   command->callback([&invocation, axis, since] { report(invocation, *axis, *since); });
 }

@@ -33,8 +33,10 @@ std::uint32_t word(const std::string& text, std::string_view what, std::int64_t 
   return static_cast<std::uint32_t>(value < 0 ? value + 65536 : value);
 }
 
-/// "6041h:00": then the node is one of a CAN network.
-bool is_object(const std::string& address) { return address.find("h:") != std::string::npos; }
+/// "6041h:00", or "6041h", as manuals write it: then the node is one of a CAN network.
+bool is_object(const std::string& address) {
+  return address.find("h:") != std::string::npos || address.ends_with('h');
+}
 
 v1::TransactRequest request_of(const Arguments& arguments) {
   v1::TransactRequest request;
@@ -44,7 +46,8 @@ v1::TransactRequest request_of(const Arguments& arguments) {
     request.set_address(word(arguments.address, "ADDRESS"));
     return request;
   }
-  const auto object = config::parse_object_address(arguments.address);
+  const bool whole = arguments.address.find(':') != std::string::npos;
+  const auto object = config::parse_object_address(whole ? arguments.address : arguments.address + ":00");
   if (!object)
     throw Failure(ExitCode::usage,
                   fmt::format("ADDRESS: {}; {}", object.error().message, object.error().suggestion));
@@ -79,6 +82,9 @@ void read_object(Invocation& invocation, const Arguments& arguments) {
 }
 
 void write_object(Invocation& invocation, const Arguments& arguments) {
+  if (arguments.address.find(':') == std::string::npos)
+    throw Failure(ExitCode::usage,
+                  fmt::format("ADDRESS: give the sub-index to write, such as {}:00", arguments.address));
   auto request = request_of(arguments);
   if (arguments.type.empty())
     throw Failure(ExitCode::usage,

@@ -103,7 +103,10 @@ void add_event_commands(CLI::App& app, Invocation& invocation) {
       "leases, held stops, commands, faults, the kept state, StopAll, certificates, writes to "
       "EEPROMs");
   const auto arguments = std::make_shared<Arguments>();
-  command->add_option("AXIS", arguments->axes, "Names of axes, with --cell also of machines; none: all");
+  command
+      ->add_option("AXIS", arguments->axes,
+                   "Names of axes, with spaces or commas between, with --cell also of machines; none: all")
+      ->delimiter(',');
   command
       ->add_option(
           "--kind", arguments->kinds,

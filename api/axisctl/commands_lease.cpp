@@ -161,7 +161,16 @@ void add_by_token(CLI::App& group, Invocation& invocation, const char* name, con
                   void (*action)(Invocation&, std::uint64_t)) {
   auto* command = group.add_subcommand(name, help);
   const auto token = std::make_shared<std::uint64_t>(0);
-  command->add_option("TOKEN", *token, "As acquire printed it")->envname("AXISD_LEASE")->required();
+  command->add_option("TOKEN", *token, "As acquire printed it")
+      ->envname("AXISD_LEASE")
+      ->required()
+      ->check(CLI::Validator(
+          [](const std::string& word) {
+            const auto number = without_machine(word);
+            const bool digits = !number.empty() && number.find_first_not_of("0123456789") == number.npos;
+            return digits ? std::string() : fmt::format("'{}' is no token; a token is a number", word);
+          },
+          ""));
   command->callback([&invocation, token, action] { action(invocation, *token); });
 }
 
@@ -189,7 +198,11 @@ void add_lease_commands(CLI::App& app, Invocation& invocation) {
   const auto acquiring = std::make_shared<Arguments>();
   auto* acquire_command = group->add_subcommand(
       "acquire", "Lease axes, all or none, and print the token; renew it before its time is over");
-  acquire_command->add_option("AXIS", acquiring->axes, "Names of one or more axes, or of groups")->required();
+  acquire_command
+      ->add_option("AXIS", acquiring->axes,
+                   "Names of one or more axes, or of groups, with spaces or commas between")
+      ->delimiter(',')
+      ->required();
   add_acquiring(*acquire_command, *acquiring);
   acquire_command->callback([&invocation, acquiring] {
     const auto response = acquire(invocation, *acquiring);

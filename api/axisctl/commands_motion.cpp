@@ -149,6 +149,10 @@ void add_simple(CLI::App& app, Invocation& invocation, const std::string& name, 
   auto* command = add(app, name, help, arguments);
   add_several_axes(*command, *arguments);
   command->get_option("AXIS")->required();
+  if constexpr (!std::is_same_v<Request, v1::DisableRequest>)
+    command->footer(
+        "\nSeveral axes are asked in this order, up to the first that is refused; what was accepted goes "
+        "on.");
   if (name == "home") add_halt_on_interrupt(*command, *arguments);
   command->callback([&invocation, arguments, method] {
     if constexpr (std::is_same_v<Request, v1::DisableRequest>)

@@ -3,6 +3,8 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cerrno>
+#include <cstring>
 #include <fstream>
 #include <iostream>
 #include <iterator>
@@ -27,8 +29,11 @@ struct RunArguments {
 std::string read_script(const std::string& path) {
   if (path == "-") return {std::istreambuf_iterator<char>(std::cin), {}};
   std::ifstream file(path);
-  std::string text{std::istreambuf_iterator<char>(file), {}};
-  if (!file) throw Failure(ExitCode::usage, fmt::format("cannot read the script '{}'", path));
+  std::string text;
+  if (file.is_open()) text.assign(std::istreambuf_iterator<char>(file), {});
+  if (!file)
+    throw Failure(ExitCode::usage,
+                  fmt::format("cannot read the script '{}': {}", path, std::strerror(errno)));
   return text;
 }
 
@@ -43,6 +48,7 @@ class Script {
 
   /// Commands and options of every line; values are looked at when it is its turn. Throws Failure (usage).
   void check() const {
+    if (lines_.empty()) throw Failure(ExitCode::usage, fmt::format("there is no command in '{}'", name_));
     for (const auto& line : lines_)
       at(line, [&] {
         Invocation nobody;

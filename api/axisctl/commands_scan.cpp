@@ -160,7 +160,14 @@ void scan(Invocation& invocation, const Arguments& arguments) {
   const std::vector<v1::FoundNode> nodes(found.begin(), found.end());
   const auto fragment =
       nodes.empty() ? std::string() : yaml_fragment(nodes, context_of(invocation, arguments.bus));
-  if (arguments.yaml) return print(fragment);
+  if (arguments.yaml) {
+    // The lines may go into a file, which says nothing of why there are none.
+    if (fragment.empty())
+      fmt::print(
+          stderr, "{}: {}\n", arguments.bus,
+          nodes.empty() ? "no node answered" : "all that answered is configured, or is no known drive");
+    return print(fragment);
+  }
   if (nodes.empty()) return print_line(fmt::format("{}: no node answered", arguments.bus));
   // Only nodes of an RS-485 line have a format.
   (nodes.front().format().empty() ? network_found_table(found) : found_table(found)).print(use_colour());
@@ -171,7 +178,8 @@ void scan(Invocation& invocation, const Arguments& arguments) {
 }  // namespace
 
 void add_scan_command(CLI::App& bus, Invocation& invocation) {
-  auto* command = bus.add_subcommand("scan", "Look for nodes; ends with lines for the configuration");
+  auto* command = bus.add_subcommand(
+      "scan", "Look for nodes; of drives that are not configured yet, ends with lines for the configuration");
   const auto arguments = std::make_shared<Arguments>();
   command->add_option("BUS", arguments->bus, "Name of the bus")->required();
   command->add_option("--nodes", arguments->nodes, "Addresses, 1-32 or 7 (default 1-127)")

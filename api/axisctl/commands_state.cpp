@@ -189,8 +189,10 @@ void add_state_commands(CLI::App& app, Invocation& invocation) {
   auto* watch_command =
       app.add_subcommand("watch", "Axes as they move: a live table on a terminal, else a line per tick");
   const auto arguments = std::make_shared<WatchArguments>();
-  watch_command->add_option("AXIS", arguments->axes,
-                            "Names of axes, with --cell also of machines; none: all");
+  watch_command
+      ->add_option("AXIS", arguments->axes,
+                   "Names of axes, with spaces or commas between, with --cell also of machines; none: all")
+      ->delimiter(',');
   watch_command->add_option("--period", arguments->period, "Time between ticks, 10ms to 60s")
       ->type_name("TIME")
       ->capture_default_str();
@@ -201,6 +203,7 @@ void add_state_commands(CLI::App& app, Invocation& invocation) {
       ->allow_extra_args(false)  // the words behind are axes
       ->type_name("FIELD,...");
   watch_command->add_option("--count", arguments->count, "End after so many ticks, of all machines together")
+      ->check(CLI::Validator(CLI::PositiveNumber).description(""))
       ->type_name("N");
   watch_command->callback([&invocation, arguments] { watch(invocation, *arguments); });
 }

@@ -15,7 +15,8 @@ void add_axis(CLI::App& command, MotionArguments& arguments) {
 }
 
 void add_several_axes(CLI::App& command, MotionArguments& arguments) {
-  command.add_option("AXIS", arguments.axes, "Names of one or more axes");
+  command.add_option("AXIS", arguments.axes, "Names of one or more axes, with spaces or commas between")
+      ->delimiter(',');
 }
 
 void add_ramps(CLI::App& command, MotionArguments& arguments) {

@@ -20,6 +20,17 @@ Failure usage(std::string_view what, const config::QuantityError& error) {
                                        error.suggestion.empty() ? "" : "; ", error.suggestion)};
 }
 
+/// "8h", "7d": longer than what a machine is told; at most ten years.
+std::optional<std::chrono::nanoseconds> long_time(std::string_view text) {
+  if (text.empty() || (text.back() != 'h' && text.back() != 'd')) return std::nullopt;
+  const auto number = config::parse_decimal(text.substr(0, text.size() - 1));
+  const double hours = text.back() == 'h' ? 1 : 24;
+  constexpr double longest = 10 * 365 * 24;
+  if (!number || number->value < 0 || number->value * hours > longest) return std::nullopt;
+  return std::chrono::round<std::chrono::nanoseconds>(
+      std::chrono::duration<double, std::ratio<3600>>(number->value * hours));
+}
+
 /// "mm, cm or m": `unit` first.
 std::string fitting(std::string_view unit) {
   std::vector<std::string_view> units{unit};
@@ -51,9 +62,10 @@ Since parse_since(std::string_view text, std::string_view what) {
       error == std::errc{} && end == text.data() + text.size())
     return {.number = number};
   if (const auto ago = config::parse_duration(text)) return {.number = std::nullopt, .ago = *ago};
+  if (const auto ago = long_time(text)) return {.number = std::nullopt, .ago = *ago};
   throw Failure(ExitCode::usage,
                 fmt::format("{}: {} is neither a number nor a time; write 120 for what comes behind it, or "
-                            "500ms, 90s or 10min for what is younger",
+                            "90s, 10min, 8h or 7d for what is younger",
                             what, config::quoted(text)));
 }
 

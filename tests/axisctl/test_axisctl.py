@@ -311,6 +311,13 @@ class Stopping(AxisctlTest):
         self.assertIn("axisctl: ghost: ", done.stderr)
         self.assertIn("feeder  Stop  Done", done.stdout)
 
+    def test_axes_may_have_commas_between(self):
+        self.assertEqual([line["axis"] for line in self.json("halt", "feeder,turntable")], ["feeder", "turntable"])
+        self.assertEqual([request.axis for request in self.server.calls("Halt")], ["feeder", "turntable"])
+        done = self.run_axisctl("stop", "ghost,feeder")
+        self.assertEqual(done.returncode, 4)
+        self.assertIn("feeder  Stop  Done", done.stdout)
+
     def test_stop_all_reports_each_axis_and_holds_until_released(self):
         done = self.run_axisctl("stop", "--all", "--wait")
         self.assertEqual(done.returncode, 1)  # ghost cannot be confirmed

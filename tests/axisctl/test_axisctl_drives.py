@@ -196,6 +196,8 @@ class Buses(AxisctlTest):
     def test_nothing_found_and_bad_ranges(self):
         self.assertEqual(self.ok("bus", "scan", "line-a", "--nodes", "20"), "line-a: no node answered\n")
         self.assertEqual(self.server.calls("Scan")[0].last_node, 20)
+        done = self.run_axisctl("bus", "scan", "line-a", "--nodes", "20", "--yaml")
+        self.assertEqual((done.returncode, done.stdout, done.stderr), (0, "", "line-a: no node answered\n"))
         for nodes in ("0-5", "1-", "a", "1-300"):
             self.fails(2, "bus", "scan", "line-a", "--nodes", nodes)
 
@@ -221,6 +223,9 @@ class Buses(AxisctlTest):
         self.ok("bus", "transact", "can0", "9", "write", "6200h:01", "0x10", "--type", "u8")
         self.assertIn("give --type", self.fails(2, "bus", "write", "can0", "9", "6200h:01", "1"))
         self.assertIn("6041h:00", self.fails(2, "bus", "read", "can0", "9", "620h:01"))
+        self.assertRegex(self.ok("bus", "read", "can0", "5", "6041h"), r"6041h:00 +37 02 +567\n")
+        self.assertIn("give the sub-index to write, such as 6200h:00",
+                      self.fails(2, "bus", "write", "can0", "9", "6200h", "1", "--type", "u8"))
         self.assertIn("permitted: u8", self.fails(2, "bus", "read", "can0", "9", "6200h:01", "--type", "u9"))
         self.assertIn("2 registers written", self.ok("bus", "transact", "line-a", "9", "write", "16", "1", "2"))
         self.assertRegex(self.ok("bus", "transact", "line-a", "9", "read", "0x10"), r"0x0010 +0xFFFF")

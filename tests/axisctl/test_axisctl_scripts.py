@@ -55,7 +55,9 @@ class Run(FileTest):
                 self.assertIn(f"{path}:2: ", complaint)
                 self.assertIn(why, complaint)
         self.assertEqual(self.calls(), [])
-        self.assertIn("cannot read the script", self.fails(2, "run", str(self.folder / "none")))
+        self.assertRegex(self.fails(2, "run", str(self.folder / "none")),
+                         r"cannot read the script '.*/none': No such file or directory")
+        self.assertIn("there is no command in ", self.fails(2, "run", self.script("# nothing yet")))
 
     def test_check_executes_nothing(self):
         path = self.script("enable feeder --wait", "move feeder 20mm")

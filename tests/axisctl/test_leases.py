@@ -28,6 +28,7 @@ class Axisctl(AxisctlTest):
         self.assertEqual(self.ok("lease", "release", token), "released\n")
         self.assertEqual(self.ok("lease", "list"), "no leases\n")
         self.assertIn("other took the lease", self.fails(4, "lease", "renew", token))
+        self.assertIn("'abc' is no token; a token is a number", self.fails(2, "lease", "renew", "abc"))
 
     def test_held_axes_are_refused_or_taken(self):
         self.ok("lease", "acquire", "feeder", "--label", "a")

@@ -103,11 +103,15 @@ class Audit(AuditScenario):
         self.assertEqual((shown.returncode, shown.stderr), (0, ""))
         self.assertEqual(shown.stdout.count(move.id), 2)
         self.assertRegex(shown.stdout, rf"feeder  {re.escape(OWN_NAME)}  .*MoveRelative  Done")
+        self.assertNotIn(f"by {OWN_NAME}", shown.stdout, "it stands in a column of its own")
         self.assertEqual(len(machine.axisctl("audit", "--last", "3").stdout.splitlines()), 3)
         self.assertEqual(machine.axisctl("audit", "--kind", "noise").returncode, 2)
         none = machine.axisctl("audit", "--kind", "gap")
         self.assertEqual((none.returncode, none.stdout), (0, "the audit has no such record\n"))
         self.assertEqual(machine.axisctl("--json", "audit", "--kind", "gap").stdout, "")
+        self.assertEqual(machine.axisctl("audit", "feedr").stdout,
+                         "the audit has no such record; 'feedr' is no axis or group now\n")
+        self.assertEqual(machine.axisctl("audit", "--last", "-1").returncode, 2)
         self.assertIn("--since: 'foo' is neither a number nor a time", machine.axisctl("audit", "--since", "foo").stderr)
         self.assertEqual(json.loads(machine.axisctl("--json", "audit", "--last", "1").stdout)["kind"], "AUDIT_KIND_COMMAND")
         report = machine.axisctl("report", "feeder")
@@ -115,6 +119,8 @@ class Audit(AuditScenario):
         self.assertRegex(report.stdout, r"motions: +2: 2 done\n")
         self.assertRegex(report.stdout, r"distance: +7 mm from start to target\n")
         self.assertRegex(report.stdout, r"stops: +1\n")
+        self.assertRegex(report.stdout, r"\ncounted since \d{4}-\d\d-\d\dT[0-9:.]+Z\n\Z")
+        self.assertEqual(machine.axisctl("report", "feeder", "--since", "8h").returncode, 0)
         self.assertEqual(json.loads(machine.axisctl("--json", "report", "feeder").stdout)["distance"], 7)
 
 

@@ -114,6 +114,12 @@ v1::AuditRecord moved(v1::CommandKind kind, double value, v1::CommandState state
   return result;
 }
 
+TEST(AuditText, WhoGaveACommandStandsInFrontAlone) {
+  auto done = moved(v1::COMMAND_KIND_MOVE_ABSOLUTE, 10);
+  done.mutable_event()->mutable_command_change()->mutable_command()->set_client("hmi-1");
+  EXPECT_THAT(audit_line(done), testing::AllOf(HasSubstr("  hmi-1  "), testing::Not(HasSubstr("by hmi-1"))));
+}
+
 TEST(AxisReport, CountsWhatTheAuditTells) {
   AxisReport report;
   report.add(moved(v1::COMMAND_KIND_MOVE_ABSOLUTE, 10));  // from where is not known

@@ -58,11 +58,14 @@ TEST(Quantity, SinceANumberOrForSoLong) {
   EXPECT_EQ(parse_since("0", "--since").number, 0U);
   EXPECT_FALSE(parse_since("10min", "--since").number);
   EXPECT_EQ(parse_since("10min", "--since").ago, 10min);
+  EXPECT_EQ(parse_since("8h", "--since").ago, 8h);
+  EXPECT_EQ(parse_since("1.5h", "--since").ago, 90min);
+  EXPECT_EQ(parse_since("7d", "--since").ago, 168h);
   EXPECT_EQ(
       refusal([] { (void)parse_since("foo", "--since"); }),
-      "--since: 'foo' is neither a number nor a time; write 120 for what comes behind it, or 500ms, 90s "
-      "or 10min for what is younger");
-  for (const char* text : {"", "-5", "-5s", "12h", "1e3", "99999999999999999999"})
+      "--since: 'foo' is neither a number nor a time; write 120 for what comes behind it, or 90s, 10min, "
+      "8h or 7d for what is younger");
+  for (const char* text : {"", "-5", "-5s", "-1h", "h", "1e9d", "1e3", "99999999999999999999"})
     EXPECT_THAT(refusal([&] { (void)parse_since(text, "--since"); }), StartsWith("--since: ")) << text;
 }
 
