@@ -16,6 +16,7 @@ export const de: Texts = {
   'nav.configuration': 'Konfiguration',
   'nav.flight-records': 'Flugschreiber',
   'nav.parameters': 'Antriebsparameter',
+  'head.axis': '1 Achse',
   'head.axes': '{count} Achsen',
   'lane.name': 'Spur',
   'lane.closed': 'zu',

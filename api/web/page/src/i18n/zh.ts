@@ -16,6 +16,7 @@ export const zh: Texts = {
   'nav.configuration': '配置',
   'nav.flight-records': '飞行记录',
   'nav.parameters': '驱动参数',
+  'head.axis': '1 个轴',
   'head.axes': '{count} 个轴',
   'lane.name': '通道',
   'lane.closed': '已断开',

@@ -9,6 +9,7 @@ import { CALL_MS, clientsOf, problem } from '../transport/clients';
 import { refreshSession, session, type Machine } from '../transport/session';
 import { LanguageChoice, PanelChoice, ThemeChoice } from '../ui/choices';
 import { pressed, StopReportView } from '../ui/stop-rail';
+import { axesText } from '../ui/words';
 
 const EVERY = 2000;
 
@@ -34,7 +35,7 @@ function words({ trouble, axes, inhibitedBy }: Seen): string {
   const moving = count((state) => state.moving);
   const faulty = count((state) => state.state === State.ERROR_STOP);
   const offline = count((state) => state.link === LinkState.OFFLINE);
-  return [t('head.axes', { count: axes.length }), moving > 0 && t('cell.moving', { count: moving }), faulty > 0 && t('cell.faulty', { count: faulty }),
+  return [axesText(axes.length), moving > 0 && t('cell.moving', { count: moving }), faulty > 0 && t('cell.faulty', { count: faulty }),
           offline > 0 && t('cell.offline', { count: offline }), inhibitedBy !== null && `${t('stop.all')} ${t('inhibit.by', { who: inhibitedBy || '?' })}`]
     .filter(Boolean).join(' · ');
 }

@@ -4,6 +4,7 @@ import { lane, laneTakes, states, store, leases, endControl, lostBy, refused } f
 import { LANE_MS } from '../hold/machine';
 import { clockFormat, t } from '../i18n';
 import { roleKey } from '../i18n/names';
+import { axesText } from './words';
 import { places, route, go, hrefOf, lastAxis, machine } from '../route';
 import { session } from '../transport/session';
 import { Dialog } from './dialog';
@@ -33,7 +34,7 @@ function Head() {
     <header>
       {machine !== '' && <a href="/">{t('cell.all')}</a>}
       <a class="machine" href={hrefOf('machine')} onClick={(event) => { event.preventDefault(); go('machine'); }}>{info?.machine ?? 'axisd'}</a>
-      <Fact>{t('head.axes', { count: store.names.value.length })}</Fact>
+      <Fact>{axesText(store.names.value.length)}</Fact>
       {store.statistics.value.map(({ bus, utilisation }) => <Fact key={bus} label={bus}>{Math.round(utilisation * 100)} %</Fact>)}
       <LaneFact />
       {/* Where the page is refused, what the daemon tells is of axisd-web itself. */}

@@ -6,6 +6,8 @@ import { endKey, kindKey, linkKey, stateKey, trustKey } from '../i18n/names';
 import { ageText, decimals, shown, spanText } from '../model/numbers';
 import { instant } from '../model/wire';
 
+export const axesText = (count: number): string => (count === 1 ? t('head.axis') : t('head.axes', { count }));
+
 /** "Standstill", "Offline 12 s". */
 export function stateText(state: AxisState, ageMs: number): string {
   if (state.link === LinkState.OFFLINE) {
