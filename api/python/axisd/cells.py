@@ -23,7 +23,8 @@ from .tls_files import Path, TlsFiles
 def connect_cell(entrance: str | None = None, *, tls_ca: Path | None = None, tls_certificate: Path | None = None,
                  tls_key: Path | None = None, timeout: float = 10.0) -> Cell:
     """A cell, by HOST:PORT of the entrance of any of its machines (without a port 7445), to be used as `async with`. Without
-    a name that of $AXISD_CELL, else localhost. Connects with the first call. `tls_ca`, `tls_certificate`, `tls_key` and `timeout` as of connect()."""
+    a name that of $AXISD_CELL, else localhost. Connects with the first call. `timeout` and the TLS files as of
+    connect()."""
     if entrance is None:
         entrance = os.environ.get("AXISD_CELL") or "localhost"
     return Cell(with_port(entrance, USUAL_CELL_PORT), TlsFiles.given(tls_ca, tls_certificate, tls_key), timeout)
