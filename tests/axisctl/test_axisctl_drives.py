@@ -98,7 +98,7 @@ class Drives(AxisctlTest):
         self.assertEqual(self.fails(4, "drive", "read", "feeder", "curent"),
                          'axisctl: feeder: ykd2405pr has no parameter "curent"; did you mean current?')
         self.assertEqual(self.fails(4, "drive", "write", "feeder", "stop=1"),
-                         "axisctl: feeder: line-a node 1 register 0x0028: stop triggers an action; use AxisService.Stop")
+                         "axisctl: feeder: line-a node 1 register 0x0028: stop triggers an action; use axisctl stop")
 
     def test_bad_assignments_reach_nothing(self):
         for text in ("current", "=3", "current=", "current=six", "current=0x", "current=--3"):
