@@ -60,7 +60,7 @@ struct MachineInfo {
   std::string inhibited_by;
   /// Why motion waits until the state is accepted; empty: it does not.
   std::string state_unaccepted;
-  std::optional<Error> storage_error{};  ///< nothing new is started for it
+  std::optional<Error> storage_error{};  ///< nothing new is started for it, or for a doubt about what was
 };
 
 /// What became of a StopAll.

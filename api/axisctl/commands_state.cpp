@@ -91,7 +91,12 @@ void kept_state(Invocation& invocation) {
   if (invocation.of_whole_cell()) return show_kept_states(invocation, show);
   const auto response =
       invocation.client().call(&v1::SystemService::Stub::GetState, v1::GetStateRequest(), std::string_view());
-  invocation.json ? print_line(json(response)) : show(response);
+  if (invocation.json) return print_line(json(response));
+  show(response);
+  const auto info =
+      invocation.client().call(&v1::SystemService::Stub::GetInfo, v1::GetInfoRequest(), std::string_view());
+  if (info.has_storage_error())
+    print_line("requests:   " + coloured(describe(info.storage_error()), Colour::yellow, use_colour()));
 }
 
 void accept_state(Invocation& invocation) {

@@ -128,6 +128,8 @@ class MachineCore {
   [[nodiscard]] StopDelays stop_delays(std::string_view bus) const { return buses_.delays_of(bus); }
   /// Why nothing new is started: the command journal or the audit cannot be written. Thread: any.
   [[nodiscard]] std::optional<Error> storage_error() const { return book_.trouble(); }
+  /// Why new requests are refused at present, if they may be old ones. Thread: any.
+  [[nodiscard]] std::optional<Error> doubt() const { return book_.doubt(); }
   /// What sees the frames of a bus. nullptr if there is none of that name.
   [[nodiscard]] const BusRecorder* find_recorder(std::string_view bus) const;
   [[nodiscard]] FlightRecorder& flight_recorder() { return flight_recorder_; }

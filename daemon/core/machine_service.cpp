@@ -56,6 +56,7 @@ MachineInfo MachineService::info() const {
   }
   if (const auto why = machine_->state_gate().unaccepted()) info.state_unaccepted = *why;
   info.storage_error = machine_->storage_error();
+  if (!info.storage_error) info.storage_error = machine_->doubt();
   return info;
 }
 

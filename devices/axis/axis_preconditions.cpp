@@ -30,6 +30,10 @@ std::vector<Obstacle> Axis::explain(const std::optional<Action>& action,
                                     const CommandOptions& options) const {
   Obstacles found;
   const bool never_waits = action && std::holds_alternative<DisableRequest>(*action);
+  const bool has_id = !action || !options.request_id.empty();
+  const auto doubt = never_waits || !has_id ? std::nullopt : env_.book->doubt(settings_.name);
+  const bool told_behind = env_.state_unaccepted != nullptr && *env_.state_unaccepted;
+  if (doubt && !told_behind) found.block(*doubt);
   const bool for_power = action && buffer_.empty() && waits_for_power(activity_, *action);
   if (action && (options.buffer_mode == BufferMode::buffered || for_power) && !never_waits) {
     look_at_buffered(*action, options, found);
@@ -39,6 +43,7 @@ std::vector<Obstacle> Axis::explain(const std::optional<Action>& action,
     look_at_motion(options, found);
     look_at_what_forbids_some(found);
   }
+  if (doubt && told_behind) found.block(*doubt);
   return std::move(found).all();
 }
 

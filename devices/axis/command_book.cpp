@@ -102,7 +102,6 @@ void CommandBook::restore(JournalContent content) {
 Result<CommandPtr> CommandBook::find_repeat(const std::string& axis, const Action& action,
                                             const CommandOptions& options) {
   if (options.request_id.empty()) return nullptr;
-  const auto now = clock_->now();
   if (const auto client = clients_.find(options.client); client != clients_.end()) {
     auto& ids = client->second;
     if (const auto found = ids.by_request.find(options.request_id); found != ids.by_request.end()) {
@@ -114,19 +113,22 @@ Result<CommandPtr> CommandBook::find_repeat(const std::string& axis, const Actio
     if (auto found = ids.known.find(options.request_id, digest(axis, action)))
       return known_repeat(*std::move(found), axis, action, options);
   }
-  if (now < doubtful_until_)
-    return fail(
-        {.reason = Reason::storage,
-         .message =
-             fmt::format("{}: whether this request was executed before is not known: the command journal was "
-                         "damaged ({})",
-                         axis, damage_),
-         .remedy = fmt::format("read the axis; what is asked for in {} s or later is new",
-                               std::chrono::ceil<std::chrono::seconds>(doubtful_until_ - now).count()),
-         .outcome = Outcome::unknown});
+  if (auto refused = doubt(axis)) return fail(*std::move(refused));
   forget_old();
   if (auto room = make_room(options.client); !room) return fail(room.error());
   return nullptr;
+}
+
+std::optional<Error> CommandBook::doubt(const std::string& axis) const {
+  const auto now = clock_->now();
+  if (now >= doubtful_until_) return std::nullopt;
+  const auto left = std::chrono::ceil<std::chrono::seconds>(doubtful_until_ - now).count();
+  return Error{.reason = Reason::storage,
+               .message = fmt::format("{}{}requests are refused for another {} s, as they may have been "
+                                      "executed before: the command journal was damaged ({})",
+                                      axis, axis.empty() ? "" : ": ", left, damage_),
+               .remedy = fmt::format("look at the machine; ask again in {} s", left),
+               .outcome = Outcome::unknown};
 }
 
 /// A repeat of what ended long ago.

@@ -41,6 +41,10 @@ class CommandBook {
   Result<CommandPtr> find_repeat(const std::string& axis, const Action& action,
                                  const CommandOptions& options);
 
+  /// Why requests with an id that is not known are refused at present: the journal was damaged, so they may
+  /// have been executed before. `axis`: that is asked for, if any. Thread: any.
+  [[nodiscard]] std::optional<Error> doubt(const std::string& axis = {}) const;
+
   /// Told of each command that is entered from now on.
   void on_open(std::function<void(const CommandPtr&)> opened) { opened_ = std::move(opened); }
 
@@ -124,7 +128,7 @@ class CommandBook {
   std::map<std::string, std::vector<Unsettled>> unsettled_;
   std::map<std::string, Error> unknown_outcomes_;
   std::function<void(const CommandPtr&)> opened_;
-  TimePoint doubtful_until_{};
+  TimePoint doubtful_until_{};  ///< this and what was damaged are known from the start
   std::string damage_;
   std::shared_ptr<int> alive_ = std::make_shared<int>(0);
 };

@@ -1,5 +1,7 @@
 // Explain: the right list in constructed situations. Each is also held against what is really refused
 // (ExplainRig).
+#include <fmt/format.h>
+
 #include "tests/rules/explain_rig.hpp"
 
 namespace axisd::test {
@@ -319,6 +321,40 @@ TEST(Explain, ARenewalOfAJogIsNotANewStart) {
   rig.run(500ms);
   EXPECT_THAT(rig.reasons(JogRequest{.velocity = 20, .hold = 2s}, options), IsEmpty());
   EXPECT_THAT(rig.reasons(JogRequest{.velocity = 30, .hold = 2s}, options), ElementsAre("(moving)"));
+}
+
+TEST(Explain, AfterALostJournalEachCommandWithAnIdIsRefusedForAWhile) {
+  ExplainRig rig({.persistence = true, .journal = true});
+  rig.ready();
+  rig.stop_daemon();
+  rig.journal.text = "lost";
+  rig.start_daemon();
+  int asked = 0;
+  const auto next = [&] {
+    return CommandOptions{.client = "hmi", .request_id = fmt::format("r{}", ++asked)};
+  };
+  for (const auto& action : every_action()) {
+    const auto found = rig.axis().explain(action, next());
+    ASSERT_FALSE(found.empty());
+    EXPECT_TRUE(found.front().blocking);
+    const auto refused = rig.try_submit(action, next());
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(to_string(found.front().error), to_string(refused.error()));
+    EXPECT_EQ(refused.error().reason, Reason::storage);
+    EXPECT_THAT(refused.error().message, HasSubstr("requests are refused for another "));
+    EXPECT_THAT(refused.error().remedy, HasSubstr("look at the machine; ask again in "));
+  }
+  const auto any = rig.axis().explain(std::nullopt, {});
+  ASSERT_FALSE(any.empty());
+  EXPECT_EQ(any.front().error.reason, Reason::storage);
+  EXPECT_TRUE(rig.machine->doubt());
+  EXPECT_THAT(rig.axis().explain(DisableRequest{}, next()), IsEmpty()) << "never taken for a repeat";
+  EXPECT_EQ(rig.complete(StopRequest{}).state, CommandState::done);
+
+  rig.run(longest_validity);
+  EXPECT_FALSE(rig.machine->doubt());
+  EXPECT_THAT(rig.axis().explain(EnableRequest{}, next()), IsEmpty());
+  EXPECT_TRUE(rig.try_submit(EnableRequest{}, next()));
 }
 
 TEST(Explain, EverythingAtOnceIsAllTold) {
