@@ -246,7 +246,7 @@ void CanopenBus::on_port(const can::PortState& state) {
 void CanopenBus::close() {
   closed_ = true;
   master_.close();
-  port_ = {.open = false, .error = std::nullopt};
+  port_ = {.open = false, .error = Error{.reason = Reason::cancelled, .message = "the bus is being closed"}};
   consider_sync();
   port_changed_.notify_all();
 }

@@ -3,6 +3,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <utility>
 
@@ -18,6 +19,17 @@ StopMachine::Answer answer_of(const Result<void>& sent) {
   if (sent) return Answer::acknowledged;
   if (sent.error().reason == Reason::refused) return Answer::refused;
   return sent.error().reason == Reason::no_reply ? Answer::no_reply : Answer::failed;
+}
+
+/// The first attempt to open a port takes some 10 ms. One that hangs is not waited for any longer.
+constexpr auto longest_first_opening = std::chrono::seconds(2);
+
+/// Right after the start of the daemon nobody knows yet whether there is a port.
+bool is_being_opened(const PortStatus& port) { return !port.open && !port.error; }
+
+Task<> first_attempt_to_open(Bus& bus, const Clock& clock) {
+  const auto until = clock.now() + longest_first_opening;
+  while (is_being_opened(bus.port()) && clock.now() < until) co_await bus.port_changed().wait_until(until);
 }
 
 }  // namespace
@@ -85,6 +97,10 @@ void Axis::leave_running(const Activity& activity) {
 }
 
 Task<> Axis::run_stop() {
+  if (is_being_opened(env_.bus->port())) {
+    co_await first_attempt_to_open(*env_.bus, *env_.clock);
+    observed_.stop_failed();  // its time is not one of those that the budget promises: there was no port
+  }
   const auto confirmed = co_await stop_and_confirm();
   const auto commands = confirmed ? stop_.confirmed() : stop_.failed();
   if (confirmed) {
@@ -95,7 +111,10 @@ Task<> Axis::run_stop() {
     observed_.stop_failed();
     // Whether it arrived is not known: the drive is connected anew, which begins with a stop (M4).
     if (confirmed.error().outcome == Outcome::unknown) bus_lost(confirmed.error());
-    if (!fault_) fault_ = confirmed.error();
+    // Nothing of this run has reached the drive: it gets the stop that is owed when it is connected, and what
+    // it does until it rests is judged then (M4).
+    const bool never_reached = !identity_ && !env_.bus->port().open;
+    if (!fault_ && !never_reached) fault_ = confirmed.error();
     log_about_axis(spdlog::level::err, LogKind::stop_unconfirmed, settings_, to_string(confirmed.error()));
     for (const auto& command : commands) {
       if (link_.offline())

@@ -168,5 +168,74 @@ TEST(M04, AStopThatIsOwedGoesBeforeTheRestOfAConfiguration) {
     }
 }
 
+/// The drive goes on as its daemon left it, and the next one is told to stop all before it knows its port.
+std::vector<Result<CommandPtr>> stopped_at_start(Rig& rig, bool runs, bool unplugged) {
+  rig.ready();
+  if (runs) run_at(rig, 50);
+  rig.kill_daemon();
+  rig.unplugged = unplugged;
+  rig.start_daemon(false);
+  return rig.machine->stop_all("hmi");
+}
+
+void expect_held_at_rest(Rig& rig) {
+  rig.reconnect();
+  rig.run(2s);
+  EXPECT_FALSE(rig.drive->shaft_moving());
+  EXPECT_EQ(rig.triggers(), 0);
+  EXPECT_NE(rig.state()->state, AxisState::error_stop);
+  EXPECT_FALSE(rig.state()->fault);
+  ASSERT_NE(rig.machine->inhibited_by(), nullptr);
+  const auto refused = rig.try_submit(MoveRelativeRequest{.distance = 1});
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().reason, Reason::inhibited);
+}
+
+TEST(M04, AStopBeforeThePortIsOpenIsSentOnceItIs) {
+  for (const bool runs : {false, true}) {
+    Rig rig({.limits = false});
+    const auto stops = stopped_at_start(rig, runs, false);
+    ASSERT_TRUE(stops.at(0));
+    const auto& stop = *stops[0];
+    EXPECT_FALSE(stop->has_ended()) << "nobody knows yet";
+    ASSERT_TRUE(rig.run_until([&] { return stop->has_ended(); }, 10s));
+    EXPECT_EQ(stop->value().state, CommandState::done) << describe(stop->value());
+    EXPECT_FALSE(rig.drive->shaft_moving()) << "told stopped, and moves";
+    EXPECT_GE(rig.writes_of(0x0028), 1);
+    expect_held_at_rest(rig);
+  }
+}
+
+TEST(M04, AStopForAPortThatIsNotThereIsOwedUntilItIs) {
+  for (const bool runs : {false, true}) {
+    Rig rig({.limits = false});
+    const auto stops = stopped_at_start(rig, runs, true);
+    ASSERT_TRUE(stops.at(0));
+    const auto& stop = *stops[0];
+    ASSERT_TRUE(rig.run_until([&] { return stop->has_ended(); }, 3s));
+    EXPECT_EQ(stop->value().state, CommandState::unknown) << "nothing was stopped";
+    rig.run(3s);
+    EXPECT_EQ(rig.state()->link, LinkState::offline);
+    EXPECT_TRUE(rig.line->wire().empty());
+    rig.line->set_open(true);
+    ASSERT_TRUE(rig.run_until([&] { return !rig.line->wire().empty(); }, 5s));
+    EXPECT_EQ(rig.line->wire().front().address(), 0x0028) << "the first frame is the stop";
+    EXPECT_TRUE(rig.line->wire().front().is_write());
+    expect_held_at_rest(rig);
+  }
+}
+
+TEST(M04, ADriveThatGoesOnUnderTheStopThatWasOwedSinceTheStartIsNotAtRest) {
+  Rig rig({.limits = false});
+  const auto stops = stopped_at_start(rig, true, true);
+  rig.run(1s);
+  rig.fault({.kind = simulation::FaultKind::drop_request, .register_address = 0x0028, .count = -1});
+  rig.line->set_open(true);
+  rig.run(5s);
+  EXPECT_NE(rig.state()->link, LinkState::online);
+  rig.faults().clear();
+  expect_held_at_rest(rig);
+}
+
 }  // namespace
 }  // namespace axisd::test

@@ -79,6 +79,7 @@ void Rig::start_daemon(bool connect) {
                                     return made;
                                   }};
   machine = std::make_unique<core::MachineCore>(std::move(parts), configuration);
+  line->set_open(!unplugged);
   line->network().advance(world.now());
   line->network().add(std::make_unique<BorrowedNode>(*drive));
   machine->start();

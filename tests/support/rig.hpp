@@ -47,6 +47,7 @@ class Rig {
   config::Configuration configuration;
   std::unique_ptr<simulation::SimulatedRtuNode> drive;
   VirtualLine* line = nullptr;
+  bool unplugged = false;  ///< when a daemon is started: its port is not there
   std::unique_ptr<core::MachineCore> machine;
 
   /// Ends the daemon; the drive goes on.
