@@ -12,6 +12,7 @@
 #include "config/access_warnings.hpp"
 #include "config/checks.hpp"
 #include "config/file_warnings.hpp"
+#include "config/motion_warnings.hpp"
 #include "config/position_warnings.hpp"
 #include "config/quantity.hpp"
 #include "config/start_warnings.hpp"
@@ -198,7 +199,7 @@ std::vector<std::string> warnings(const std::vector<BusBudgetReport>& reports) {
 
 std::vector<std::string> other_warnings(const Configuration& configuration) {
   std::vector<std::string> lines;
-  for (const auto look : {position_warnings, start_warnings, file_warnings, access_warnings})
+  for (const auto look : {motion_warnings, position_warnings, start_warnings, file_warnings, access_warnings})
     std::ranges::move(look(configuration), std::back_inserter(lines));
   return lines;
 }
