@@ -66,11 +66,53 @@ void check_metrics(const MetricsSettings& metrics, Diagnostics& diagnostics, con
                     "listen on localhost, or say server.metrics.remote: true if that is meant");
 }
 
+/// Whoever listens at the one listens at the other, too.
+bool includes(std::string_view host, std::string_view other) {
+  if (host == "0.0.0.0") return !other.starts_with('[');
+  if (host == "localhost" && (other == "127.0.0.1" || other == "[::1]")) return true;
+  return host == "[::]" || host == other;
+}
+
+bool is_same_address(std::string_view one, std::string_view other) {
+  const auto colon = one.rfind(':'), other_colon = other.rfind(':');
+  if (colon == std::string_view::npos || other_colon == std::string_view::npos) return false;
+  const auto port = port_number(one.substr(colon + 1));
+  if (!port || *port == 0 || port != port_number(other.substr(other_colon + 1))) return false;
+  const auto host = one.substr(0, colon), other_host = other.substr(0, other_colon);
+  return includes(host, other_host) || includes(other_host, host);
+}
+
+/// Where stops are taken without stop_listen; empty: there is no such port.
+std::string stop_lane_beside(std::string_view listen) {
+  const auto colon = listen.rfind(':');
+  if (listen.starts_with("unix:") || colon == std::string_view::npos) return {};
+  const auto port = port_number(listen.substr(colon + 1));
+  return port && *port != 0 ? fmt::format("{}:{}", listen.substr(0, colon), *port + 1) : std::string();
+}
+
+void check_metrics_apart(const ServerSettings& server, Diagnostics& diagnostics, const Places& places) {
+  if (!places.usable("server.metrics.listen") || server.metrics.listen.empty()) return;
+  const auto add = [&](std::string_view what) {
+    diagnostics.add(places.mark("server.metrics.listen"),
+                    fmt::format("{} is {}, too", quoted(server.metrics.listen), what),
+                    "give the metrics a port of their own, such as that of server.listen + 2");
+  };
+  if (places.usable("server.listen") && is_same_address(server.metrics.listen, server.listen))
+    return add("server.listen");
+  const bool of_its_own = !server.stop_listen.empty();
+  const auto stops = of_its_own ? server.stop_listen : stop_lane_beside(server.listen);
+  if (places.usable(of_its_own ? "server.stop_listen" : "server.listen") &&
+      is_same_address(server.metrics.listen, stops))
+    add(of_its_own ? "server.stop_listen"
+                   : "the address of the stops (the port after that of server.listen)");
+}
+
 void check_server(const Configuration& configuration, Diagnostics& diagnostics, const Places& places) {
   const auto& server = configuration.server;
   check_address("server.listen", server.listen, configuration, diagnostics, places);
   check_address("server.stop_listen", server.stop_listen, configuration, diagnostics, places);
   check_metrics(server.metrics, diagnostics, places);
+  check_metrics_apart(server, diagnostics, places);
   if (!server.stop_listen.empty() && server.stop_listen == server.listen)
     diagnostics.add(places.mark("server.stop_listen"),
                     fmt::format("{} is server.listen, too", quoted(server.listen)),
