@@ -378,6 +378,12 @@ config::LoadResult load_configuration(const Options& options, tls::Demand demand
                                   .message = "without tls, --listen " + server.listen + " is for plaintext",
                                   .suggestion = "server.plaintext permits unix:/PATH only"});
     loaded.configuration.reset();
+  } else if (server.stop_listen.empty() && options.listen.ends_with(":65535")) {
+    loaded.diagnostics.push_back(
+        {.file = options.config,
+         .message = "--listen " + options.listen + ": there is no port after 65535 for the stop lane",
+         .suggestion = "choose another port, or say server.stop_listen"});
+    loaded.configuration.reset();
   }
   return loaded;
 }

@@ -2,9 +2,33 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdlib>
+#include <filesystem>
 #include <iostream>
+#include <string>
+
+#include "buses/port_number.hpp"
 
 namespace axisd {
+
+namespace {
+
+/// As `listen` of the configuration. Empty: in order.
+std::string judge_listen(const std::string& text) {
+  const auto colon = text.rfind(':');
+  const bool unix_socket = text.starts_with("unix:/");
+  const bool host = colon != std::string::npos && colon > 0 && text.substr(0, colon) != "unix";
+  if (unix_socket || (host && port_number(text.substr(colon + 1)))) return {};
+  return "'" + text +
+         "' is no address: write HOST:PORT, [IPV6]:PORT or unix:/PATH, with a port of 0 to 65535";
+}
+
+/// As `state_directory` of the configuration: the service does not start in the folder of whoever tries it.
+std::string judge_directory(const std::string& text) {
+  if (std::filesystem::path(text).is_absolute()) return {};
+  return "'" + text + "' is no absolute path: write /PATH";
+}
+
+}  // namespace
 
 Options parse_options(int argc, char** argv) {
   Options options;
@@ -26,8 +50,10 @@ Options parse_options(int argc, char** argv) {
       "put a backup (axisctl state backup) in the place of what the state directory holds, while no "
       "axisd uses it, and exit");
   app.add_option("--state-directory", options.state_directory,
-                 "overrides state_directory of the configuration");
-  app.add_option("--listen", options.listen, "overrides server: { listen } of the configuration");
+                 "overrides state_directory of the configuration")
+      ->check(judge_directory);
+  app.add_option("--listen", options.listen, "overrides server: { listen } of the configuration")
+      ->check(judge_listen);
   app.add_option("--wire-log", options.wire_log, "append every frame with its time to this file");
   app.add_option("--link-helper", options.link_helper,
                  "unix socket of axisd-link, which takes CAN links down and up")
