@@ -22,8 +22,11 @@ constexpr auto quiesce_limit = std::chrono::seconds(4);
 /// As run_quiesce(). Throws where the system has no more of something.
 int quiesce(const Options& options) {
   auto loaded = config::load_file(*options.quiesce);
-  if (!loaded.configuration) {
+  const auto tell = [&loaded] {
     for (const auto& diagnostic : loaded.diagnostics) std::cerr << to_string(diagnostic) << '\n';
+  };
+  if (!loaded.configuration) {
+    tell();
     const auto directory =
         options.state_directory.empty() ? config::Configuration{}.state_directory : options.state_directory;
     std::cerr << "axisd: using the last configuration that was served: " << last_good(directory).string()
@@ -31,6 +34,7 @@ int quiesce(const Options& options) {
     loaded = config::load_file(last_good(directory).string(), *options.quiesce);
   }
   if (!loaded.configuration) {
+    tell();
     std::cerr << "axisd: no usable configuration: nothing was stopped\n";
     return exit_status::configuration;
   }

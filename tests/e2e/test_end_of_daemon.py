@@ -72,6 +72,20 @@ class NotStarted(Scenario):
             address = f"127.0.0.1:{taken.getsockname()[1]}"
             self.ends(1, f"{address}: cannot bind: Address already in use", "--listen", address)
 
+    def test_a_command_line_that_is_judged_before_anything_opens(self):
+        for option, value, words in (
+                ("--listen", "127.0.0.1:80x", "'127.0.0.1:80x' is no address"),
+                ("--listen", "localhost", "'localhost' is no address"),
+                ("--listen", "127.0.0.1:70000", "'127.0.0.1:70000' is no address"),
+                ("--listen", "unix:axisd.sock", "'unix:axisd.sock' is no address"),
+                ("--listen", "127.0.0.1:65535", "there is no port after 65535"),
+                ("--state-directory", "state", "'state' is no absolute path")):
+            with self.subTest(value=value):
+                done = run([AXISD, "--config", self.subject.config, option, value])
+                self.assertEqual((done.returncode, done.stdout), (2, ""), done)
+                self.assertIn(words, done.stderr)
+                self.assertEqual(len(done.stderr.splitlines()), 1, "nothing was opened")
+
     def test_plaintext_by_the_command_line(self):
         self.ends(2, "plaintext is refused", "--listen", "0.0.0.0:0")
 
@@ -152,6 +166,17 @@ class Killed(Scenario):
         self.assertIn("nonsense", done.stderr)
         self.assertIn("last-good.yaml", done.stderr)
         self.assertFalse(machine.sim.shaft().moving)
+
+
+    def test_quiesce_without_any_usable_file(self):
+        machine = self.machine({"feeder": feeder()})
+        done = run([AXISD, "--quiesce", machine.path("nothere.yaml"), "--state-directory", machine.state_directory])
+        self.assertEqual((done.returncode, done.stdout), (2, ""), done)
+        missing, using, last, end = done.stderr.splitlines()
+        self.assertIn("nothere.yaml: cannot be read", missing)
+        self.assertIn("using the last configuration that was served", using)
+        self.assertIn("last-good.yaml: cannot be read", last)
+        self.assertIn("nothing was stopped", end)
 
 
 class Systemd(Scenario):
