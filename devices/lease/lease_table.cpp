@@ -62,7 +62,7 @@ Result<LeaseGrant> LeaseTable::acquire(const LeaseRequest& request, TimePoint no
   if (!request.take)
     for (const auto& axis : request.axes)
       if (const auto* other = living(axis, now)) {
-        auto refusal = held(*other, axis, now);
+        auto refusal = held(*other, axis, request.client, now);
         refusal.message = fmt::format("{}: {}", axis, refusal.message);
         return fail(std::move(refusal));
       }
@@ -154,11 +154,13 @@ std::vector<Lease> LeaseTable::list() const {
   return all;
 }
 
-Error LeaseTable::held(const Lease& lease, std::string_view axis, TimePoint now) {
-  return {
-      .reason = Reason::lease_required,
-      .message = until(lease, now),
-      .remedy = fmt::format("ask its holder, wait, or take it over: axisctl lease acquire {} --take", axis)};
+Error LeaseTable::held(const Lease& lease, std::string_view axis, const std::string& client, TimePoint now) {
+  const bool its_own = lease.client == client && !client.empty();
+  return {.reason = Reason::lease_required,
+          .message = until(lease, now),
+          .remedy = fmt::format(
+              "{}, wait, or take it over: axisctl lease acquire {} --take",
+              its_own ? "give its token (axisctl: --lease TOKEN or AXISD_LEASE)" : "ask its holder", axis)};
 }
 
 /// What became of a lease, and who has `axis` (or the first of its axes) now.
@@ -186,14 +188,14 @@ Error LeaseTable::lost(std::uint64_t token, std::string_view axis, TimePoint now
 Result<void> LeaseTable::check(std::string_view axis, const Requester& requester, TimePoint now) const {
   const auto* lease = living(axis, now);
   if (requester.lease_token == 0) {
-    if (lease != nullptr) return fail(held(*lease, axis, now));
+    if (lease != nullptr) return fail(held(*lease, axis, requester.client, now));
     if (!settings_.required) return {};
     return fail(Reason::lease_required, "this machine is commanded under leases only (control: leased)",
                 fmt::format("acquire one: axisctl lease acquire {}, and give its token", axis));
   }
   const bool its_own = lease != nullptr && lease->token == requester.lease_token;
   if (its_own && lease->client == requester.client) return {};
-  if (its_own) return fail(held(*lease, axis, now));
+  if (its_own) return fail(held(*lease, axis, requester.client, now));
   const auto other = leases_.find(requester.lease_token);
   if (other == leases_.end() || other->second.client != requester.client || now >= other->second.expires)
     return fail(lost(requester.lease_token, axis, now));

@@ -49,7 +49,8 @@ class LeaseTable {
   Result<Leases::iterator> held_by(const Requester& holder, TimePoint now);
   EndedLease end(Leases::iterator lease, LeaseEnd how, std::string by, TimePoint now);
   [[nodiscard]] Error lost(std::uint64_t token, std::string_view axis, TimePoint now) const;
-  [[nodiscard]] static Error held(const Lease& lease, std::string_view axis, TimePoint now);
+  [[nodiscard]] static Error held(const Lease& lease, std::string_view axis, const std::string& client,
+                                  TimePoint now);
 
   LeaseSettings settings_;
   std::uint64_t last_token_;

@@ -49,6 +49,9 @@ TEST_F(Leases, ALeasedAxisNeedsItsTokenFromItsHolder) {
   EXPECT_EQ(without.error().reason, Reason::lease_required);
   EXPECT_THAT(without.error().message, HasSubstr("leased by a (panel 2) for another 1.5 s"));
   EXPECT_THAT(without.error().remedy, HasSubstr("--take"));
+  EXPECT_THAT(without.error().remedy, HasSubstr("give its token (axisctl: --lease TOKEN or AXISD_LEASE)"));
+  const auto stranger = table_.check("x", {.client = "b"}, start);
+  EXPECT_THAT(stranger.error().remedy, ::testing::StartsWith("ask its holder, wait, or take it over: "));
   // Tokens can be guessed: they count only for who acquired them.
   EXPECT_EQ(refused("x", {.client = "b", .lease_token = lease.token}), Reason::lease_required);
   EXPECT_EQ(table_.renew({.client = "b", .lease_token = lease.token}, start).error().reason,
