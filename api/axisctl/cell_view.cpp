@@ -67,6 +67,11 @@ void update(Machines& machines, const cell::v1::WatchMachinesResponse& change) {
   for (const auto& name : change.forgotten()) machines.erase(name);
 }
 
+/// By etcd alone: an entrance without it asks a machine no more than whether it is there.
+bool is_known_inside(const cell::v1::Machine& machine) {
+  return machine.axes_size() > 0 || !machine.configuration_revision().empty();
+}
+
 bool answers(const cell::v1::Machine& machine) {
   return machine.state() == cell::v1::MACHINE_STATE_PRESENT ||
          machine.state() == cell::v1::MACHINE_STATE_UNREGISTERED;
@@ -80,20 +85,21 @@ Table machine_table(const Machines& machines) {
   for (const auto& [name, machine] : machines)
     table.add({name,
                {state_word(machine.state()), state_colour(machine.state())},
-               std::to_string(machine.axes_size()),
+               is_known_inside(machine) ? std::to_string(machine.axes_size()) : "-",
                machine.version(),
                time_text(machine.since()),
                machine.has_round_trip() ? duration_text(seconds(machine.round_trip())) : "-",
                machine.stop_all() ? Cell("latched", Colour::yellow) : Cell("-"),
-               machine.configuration_revision(),
+               is_known_inside(machine) ? machine.configuration_revision() : "-",
                machine.axisd_address(),
                {remarks(machine), machine.trouble().empty() ? Colour::none : Colour::red}});
   return table;
 }
 
 std::string machine_line(const cell::v1::Machine& machine) {
-  return fmt::format("{}  {}, since {}, {} axes{}{}{}", machine.name(), state_word(machine.state()),
-                     time_text(machine.since()), machine.axes_size(),
+  return fmt::format("{}  {}, since {}{}{}{}{}", machine.name(), state_word(machine.state()),
+                     time_text(machine.since()),
+                     is_known_inside(machine) ? fmt::format(", {} axes", machine.axes_size()) : "",
                      machine.stop_all() ? ", all axes stopped" : "", machine.trouble().empty() ? "" : ": ",
                      machine.trouble());
 }

@@ -31,6 +31,8 @@ class Machines(CellTest):
         two = machines["press-2"]
         self.assertEqual((two.state, two.axes[0], two.version, two.round_trip, two.stop_all, two.own),
                          (axisd.MachineState.PRESENT, "press-2/feeder", "0.1.0", 0.0004, False, False))
+        self.fake.machines["press-3"].axes.clear()
+        self.assertIsNone((await self.cell.machines())["press-3"].axes, "known by hand: nobody asked for them")
         info = await self.cell.info()
         self.assertEqual((info.cell, info.machine, info.registry, info.client, info.stop_all),
                          ("hall-1", "press-1", axisd.Registry.OK, "anna", ()))

@@ -63,13 +63,13 @@ def _registry(number: int) -> Registry:
 
 @dataclasses.dataclass(frozen=True)
 class CellMachine:
-    """A machine, as the entrance sees it. `axes`: their names as Cell.axis() takes them. `round_trip`: of the last question
-    that was answered (s). `stop_all`: its own StopAll holds it. `trouble`: why it does not answer, or is not taken for
+    """A machine, as the entrance sees it. `axes`: their names as Cell.axis() takes them; None: not known, as without etcd
+    (Machine.axes() asks it). `round_trip`: of the last question that was answered (s). `stop_all`: its own StopAll holds it. `trouble`: why it does not answer, or is not taken for
     this machine. `own`: it is the entrance's."""
     name: str
     state: MachineState
     since: datetime.datetime | None
-    axes: tuple[str, ...]
+    axes: tuple[str, ...] | None
     version: str
     configuration_revision: str
     round_trip: float | None
@@ -80,8 +80,10 @@ class CellMachine:
 
     @classmethod
     def of(cls, raw: cell_pb.Machine) -> CellMachine:
+        known = raw.axes or raw.configuration_revision
         return cls(raw.name, _machine_state(raw.state), _optional_time(raw, "since"),
-                   tuple(f"{raw.name}/{axis}" for axis in raw.axes), raw.version, raw.configuration_revision,
+                   tuple(f"{raw.name}/{axis}" for axis in raw.axes) if known else None, raw.version,
+                   raw.configuration_revision,
                    _optional_seconds(raw, "round_trip"), raw.stop_all, raw.trouble, raw.own, raw)
 
 

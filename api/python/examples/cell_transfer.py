@@ -18,7 +18,8 @@ async def show(cell: axisd.Cell) -> None:
     print(f"{info.cell}, through {info.machine}, registry {info.registry.value}")
     for name, machine in (await cell.machines()).items():
         since = f" since {machine.since:%Y-%m-%d %H:%M:%S}" if machine.since else ""
-        print(f"  {name}: {machine.state.value}{since}, {len(machine.axes)} axes" + (", all stopped" if machine.stop_all else ""))
+        axes = "" if machine.axes is None else f", {len(machine.axes)} axes"
+        print(f"  {name}: {machine.state.value}{since}{axes}" + (", all stopped" if machine.stop_all else ""))
 
 
 async def run(lease: axisd.CellLease, ways: dict[str, float]) -> None:

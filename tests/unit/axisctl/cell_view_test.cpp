@@ -55,6 +55,15 @@ TEST(CellView, MachinesAsATableAndAsALine) {
   EXPECT_EQ(machine_line(two), "press-2  silent, since 2027-01-15T08:00:00Z, 1 axes: connection refused");
 }
 
+TEST(CellView, AMachineThatIsKnownByHandHasNoCountOfAxes) {
+  auto one = machine("press-1", cell::v1::MACHINE_STATE_PRESENT);
+  one.clear_axes();
+  EXPECT_EQ(machine_line(one), "press-1  present, since 2027-01-15T08:00:00Z");
+  EXPECT_THAT(machine_table({{"press-1", one}}).lines(false).at(1), testing::ContainsRegex("present +- "));
+  one.set_configuration_revision("c0ffee");
+  EXPECT_EQ(machine_line(one), "press-1  present, since 2027-01-15T08:00:00Z, 0 axes") << "it has none";
+}
+
 TEST(CellView, WarnsOfWhatMattersBeforeMachinesDo) {
   cell::v1::GetCellResponse told;
   told.set_registry(cell::v1::REGISTRY_STATE_OK);
