@@ -103,7 +103,8 @@ class TreeBuilder : public YAML::EventHandler {
   }
 
   static NodePtr check_key(const NodePtr& key, Mark mark) {
-    if (key->kind != Node::Kind::scalar) throw SyntaxError{mark, "a key must be a word", ""};
+    if (key->kind != Node::Kind::scalar)
+      throw SyntaxError{mark, "a key must be a word", "one brace or bracket too many?"};
     if (key->plain && key->text == "<<") {
       throw SyntaxError{mark, "merge keys ('<<') are not supported",
                         "write the keys out, or use an alias for a value"};

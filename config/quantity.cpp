@@ -64,6 +64,10 @@ std::unexpected<QuantityError> not_a_number(std::string_view text) {
                "write a finite decimal number, such as 12.5");
 }
 
+std::unexpected<QuantityError> too_large(std::string_view text) {
+  return wrong(fmt::format("{} is too large", quoted(text)), "write a number of 18 digits at most");
+}
+
 std::unexpected<QuantityError> too_long(std::string_view text) {
   return wrong(fmt::format("{} does not fit into 18 digits", quoted(text)), "round it");
 }
@@ -159,7 +163,7 @@ QuantityResult<Decimal> parse_decimal(std::string_view text) {
   }
   if (at < all.size()) {
     const auto written = parse_exponent(all.substr(at + 1));
-    if (!written) return too_long(text);
+    if (!written) return all[at + 1] == '-' ? too_long(text) : too_large(text);
     exponent += *written;
   }
   if (exponent < -100'000) return too_long(text);
@@ -169,7 +173,7 @@ QuantityResult<Decimal> parse_decimal(std::string_view text) {
   const auto body = all.front() == '+' ? all.substr(1) : all;
   std::from_chars(body.data(), body.data() + body.size(), value);
   const auto result = scaled(numerator, exponent, value);
-  if (!result) return too_long(text);
+  if (!result) return exponent > 0 ? too_large(text) : too_long(text);
   return *result;
 }
 

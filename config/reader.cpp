@@ -198,7 +198,8 @@ std::optional<Value> Reader::read_section_key(const KeySpec& spec, const Node& k
   if (spec.kind == Kind::named_sections) {
     if (key.text.size() <= longest_name && matches(key.text, name_pattern)) return Value{.text = key.text};
     report(path, key.mark, fmt::format("{} is not a name", quoted(key.text)),
-           "a letter, then letters, digits, - or _; lower case");
+           fmt::format("a letter, then letters, digits, - or _; lower case; {} characters at most",
+                       longest_name));
     return std::nullopt;
   }
   const auto number = matches(key.text, "[1-9][0-9]{0,5}") ? std::stoi(key.text) : 0;

@@ -17,12 +17,20 @@ constexpr std::string_view brake = "brake";
 
 /// The first terminal that can have the function (of the drive's direction) and that the axis does not name;
 /// empty if there is none.
+/// One with a number, such as X3, before those for a pulse train (PU, DR), to which a controller may be
+/// wired.
 std::string_view free_terminal(std::span<const TerminalSpec> all, const std::vector<TerminalSettings>& used,
                                std::string_view function) {
-  const auto free = std::ranges::find_if(all, [&](const TerminalSpec& terminal) {
+  const auto is_free = [&](const TerminalSpec& terminal) {
     const bool fits = terminal.function.empty() || terminal.function == function;
     return fits && std::ranges::find(used, terminal.name, &TerminalSettings::terminal) == used.end();
-  });
+  };
+  const auto has_number = [](const TerminalSpec& terminal) {
+    return terminal.name.back() >= '0' && terminal.name.back() <= '9';
+  };
+  auto free = std::ranges::find_if(
+      all, [&](const auto& terminal) { return has_number(terminal) && is_free(terminal); });
+  if (free == all.end()) free = std::ranges::find_if(all, is_free);
   return free == all.end() ? std::string_view() : free->name;
 }
 

@@ -181,7 +181,11 @@ Parsed parse_position_range(const KeySpec& spec, const Node& node, std::string_v
     if (!value) return value;
     (i == 0 ? result.number : result.second) = value->number;
   }
-  if (result.number >= result.second) {
+  if (result.number == result.second)
+    return wrong(node,
+                 fmt::format("'{}' has no range: both ends are {}", spec.key, format_number(result.number)),
+                 "write [minimum, maximum]");
+  if (result.number > result.second) {
     return wrong(node,
                  fmt::format("'{}' is reversed: {} is not below {}", spec.key, format_number(result.number),
                              format_number(result.second)),
