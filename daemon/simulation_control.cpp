@@ -27,7 +27,10 @@ std::string_view take_word(std::string_view& text) {
 
 SimulationControl::SimulationControl(core::CoreLoop& loop, SimulatedLines& lines, SimulatedNetworks& networks,
                                      const config::Configuration& configuration)
-    : loop_(&loop), lines_(&lines), networks_(&networks), axes_(configuration.axes) {}
+    : loop_(&loop), lines_(&lines), networks_(&networks), axes_(configuration.axes) {
+  for (const auto& line : configuration.lines) buses_.push_back(line.name);
+  for (const auto& network : configuration.networks) buses_.push_back(network.name);
+}
 
 void SimulationControl::reconfigure(const config::Configuration& configuration) {
   const std::lock_guard lock(mutex_);
@@ -62,6 +65,10 @@ std::string SimulationControl::on_axis(std::string_view name, std::string_view c
 }
 
 std::string SimulationControl::on_bus(std::string_view name, std::string_view command) {
+  if (std::ranges::find(buses_, name) == buses_.end())
+    return refusal({.reason = Reason::invalid_argument,
+                    .message = fmt::format("there is no bus '{}'", name),
+                    .remedy = fmt::format("name one of {}", fmt::join(buses_, ", "))});
   if (command == "cut" || command == "join") return on_network(std::string(name), std::string(command));
   if (command == "clear") return on_network(std::string(name), "fault clear");
   return "error that is no command for a simulated bus; use: cut, join or clear";

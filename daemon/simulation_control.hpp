@@ -36,7 +36,8 @@ class SimulationControl {
   core::CoreLoop* loop_;
   SimulatedLines* lines_;
   SimulatedNetworks* networks_;
-  std::mutex mutex_;  ///< for axes_
+  std::vector<std::string> buses_;  ///< all, simulated or not; a reload never changes them
+  std::mutex mutex_;                ///< for axes_
   std::vector<config::AxisEntry> axes_;
 };
 

@@ -10,7 +10,9 @@
 #include <optional>
 #include <span>
 #include <system_error>
+#include <vector>
 
+#include "devices/descriptor.hpp"
 #include "devices/simulation/text.hpp"
 #include "devices/units/scale.hpp"
 
@@ -28,6 +30,14 @@ std::unexpected<Error> use(std::string_view how) {
 Result<std::string> input(const AxisSettings& axis, Words words) {
   constexpr auto how = "input TERMINAL on|off|auto";
   if (words.size() != 2) return use(how);
+  const auto* drive = descriptor_of(axis);
+  if (drive != nullptr && !drive->inputs.empty() &&
+      std::ranges::find(drive->inputs, words[0], &TerminalSpec::name) == drive->inputs.end()) {
+    std::vector<std::string_view> names;
+    for (const auto& terminal : drive->inputs) names.push_back(terminal.name);
+    return fail(Reason::invalid_argument, fmt::format("there is no input {}", words[0]),
+                fmt::format("it has {}", fmt::join(names, ", ")));
+  }
   if (words[1] == "auto") return fmt::format("input {} {} auto", axis.node, words[0]);
   const auto active = parse_on_off(words[1]);
   if (!active) return use(how);

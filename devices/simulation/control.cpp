@@ -40,7 +40,7 @@ std::string alarm(SimulatedNode& node, Words words) {
   const auto code = words.size() == 1 ? parse_number<int>(words[0]) : std::nullopt;
   const auto known = node.alarms();
   if (!code || (*code != 0 && std::ranges::find(known, *code) == known.end()))
-    return fmt::format("error use: alarm N CODE, with {} (0: the cause is gone)", fmt::join(known, ", "));
+    return fmt::format("error no such alarm; it has {} (0: the cause is gone)", fmt::join(known, ", "));
   node.raise_alarm(*code);
   return "ok";
 }

@@ -86,8 +86,9 @@ class Simulation(Scenario):
         refused = self.axisctl("sim", "power", "fedeer", "off")
         self.assertEqual((refused.returncode, refused.stderr),
                          (4, "axisctl: fedeer: there is no axis 'fedeer'; did you mean 'feeder'?\n"))
-        self.assertIn("no input X9", self.axisctl("sim", "input", "feeder", "X9", "on").stderr)
-        self.assertIn("is not simulated", self.axisctl("sim", "cut", "line-z").stderr)
+        self.assertIn("there is no input X9; it has PU, DR, X0", self.axisctl("sim", "input", "feeder", "X9", "on").stderr)
+        self.assertIn("there is no bus 'line-z'; name one of line-a", self.axisctl("sim", "cut", "line-z").stderr)
+        self.assertIn("no such alarm; it has 1, ", self.axisctl("sim", "alarm", "feeder", "99").stderr)
 
 
 if __name__ == "__main__":

@@ -50,6 +50,13 @@ TEST(AxisControl, RefusesWhatItDoesNotUnderstand) {
     EXPECT_THAT(command(wrong), testing::StartsWith("error ")) << wrong;
 }
 
+TEST(AxisControl, AnInputThatTheModelLacksIsRefusedWithThoseThatItHas) {
+  auto axis = feeder();
+  axis.model = "ess42-r";
+  EXPECT_EQ(command("input X9 on", axis), "error it has X0, X1, X2, X3");
+  EXPECT_EQ(command("input X3 on", axis), "input 3 X3 on");
+}
+
 TEST(AxisControl, ShowsTheLoadWhereItIs) {
   EXPECT_EQ(axis_reply(feeder(), 50, "ok position=-150 moving=0 starts=2"),
             "ok the load is at 48.5 mm, at rest, 2 starts");
