@@ -66,8 +66,8 @@ std::string to_string(const Error& error) {
   if (!text.empty()) text += ": ";
   text += error.message.empty() ? std::string(to_string(error.reason)) : error.message;
   if (error.permitted)
-    text += fmt::format(" (permitted {} to {} {})", error.permitted->minimum, error.permitted->maximum,
-                        error.permitted->unit);
+    text += fmt::format(" (permitted {} to {}{}{})", error.permitted->minimum, error.permitted->maximum,
+                        error.permitted->unit.empty() ? "" : " ", error.permitted->unit);
   if (!error.remedy.empty()) text += "; " + error.remedy;
   return text;
 }

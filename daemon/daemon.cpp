@@ -279,7 +279,12 @@ server::StopLaneOptions Doors::stop_lane_options() {
 
 /// All addresses. The port of the main one; 0: it is a unix socket. Errors: those of each listen().
 Result<int> Doors::open() {
-  if (const auto stops = stop_lane_.listen(); !stops) return fail(stops.error());
+  if (const auto stops = stop_lane_.listen(); !stops) {
+    auto error = stops.error();
+    if (configuration_.server.stop_listen.empty())
+      error.message += fmt::format(" (for stops, beside {})", configuration_.server.listen);
+    return fail(std::move(error));
+  }
   const auto port = server_.start();
   if (!port) return fail(port.error());
   if (const auto metrics = metering_.listen(); !metrics) return fail(metrics.error());
@@ -300,9 +305,9 @@ int Doors::serve(int port) {
                           [this] { return stop_lane_.connect_inside(); }, std::move(knocks));
   doors.ask();  // its connections are there before anybody else's
   log_about(spdlog::level::info, LogKind::daemon_serves, {},
-            fmt::format("axisd {} serves '{}' on {} ({} axes)", AXISD_VERSION, configuration_.machine,
+            fmt::format("axisd {} serves '{}' on {} ({} {})", AXISD_VERSION, configuration_.machine,
                         port == 0 ? configuration_.server.listen : fmt::format("port {}", port),
-                        configuration_.axes.size()));
+                        configuration_.axes.size(), configuration_.axes.size() == 1 ? "axis" : "axes"));
   const auto sim_socket = open_simulation(*ground_.ports, configuration_, ground_.instance_id);
   sd_notify(0, "READY=1");
   const int number = supervise({.loop = ground_.loop,

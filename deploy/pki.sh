@@ -161,12 +161,14 @@ case "$command" in
     echo "$dir/ca.crt: the authority $name, valid until $(end_of "$dir/ca.crt"); nobody is revoked by $dir/clients.crl"
     ;;
   server)
+    [ $# -ne 1 ] || die "server $1: give its HOST, each name and address by which clients call it"
     [ $# -ge 2 ] || usage
     authority
     hosts=$(alternatives "${@:2}")
     new_pair "$1" serverAuth "$hosts"
     ;;
   peer)
+    [ $# -ne 1 ] || die "peer $1: give its HOST, each name and address by which others call it"
     [ $# -ge 2 ] || usage
     authority
     hosts=$(alternatives "${@:2}")

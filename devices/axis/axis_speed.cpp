@@ -67,7 +67,7 @@ bool Axis::watch_speed(SpeedWatch::Event event) {
                         "units of the axis are not those of the drive",
                         text_of(speed_watch_.seen(), scale_), text_of(speed_watch_.fastest(), scale_)),
             fmt::format(
-                "compare pulses_per_revolution (scale: microstep){} with the drive; then reset the axis, "
+                "compare scale.microstep{} with the drive; then reset the axis, "
                 "try slowly, and home it",
                 has_velocity_unit(descriptor()) ? ", the drive's own gear and drive: velocity_unit" : "")));
   return true;

@@ -16,7 +16,7 @@ namespace {
 
 Error out_of_range(std::string message, double minimum, double maximum, std::string unit) {
   return {.reason = Reason::out_of_range,
-          .message = std::move(message),
+          .message = std::move(message) + " is out of range",
           .remedy = "choose a value in the permitted range",
           .permitted = Range{.minimum = minimum, .maximum = maximum, .unit = std::move(unit)}};
 }
