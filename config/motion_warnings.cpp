@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
 #include <optional>
 
 #include "buses/seconds.hpp"
@@ -19,6 +20,11 @@ std::optional<double> range_of(const AxisSettings& axis) {
   return *limits.position_maximum - *limits.position_minimum;
 }
 
+/// For people; below 1 with two digits.
+std::string to_a_tenth(double value) {
+  return value < 1 ? fmt::format("{:.2g}", value) : format_number(std::round(value * 10) / 10);
+}
+
 void look_at_ways(const AxisSettings& axis, std::vector<std::string>& lines) {
   const auto range = range_of(axis);
   if (!range) return;
@@ -28,8 +34,7 @@ void look_at_ways(const AxisSettings& axis, std::vector<std::string>& lines) {
   if (axis.jog_travel > *range)
     lines.push_back(
         fmt::format("axis {}: jog_travel {} is more than the range of limits.position, {}: nothing but a "
-                    "limit switch ends "
-                    "a jog while the position is unknown; write a shorter one",
+                    "limit switch ends a jog while the position is unknown; write a shorter one",
                     axis.name, way(axis.jog_travel), way(*range)));
   if (axis.homing && axis.homing->max_travel && *axis.homing->max_travel < *range)
     lines.push_back(fmt::format(
@@ -51,9 +56,9 @@ void look_at_braking(const AxisSettings& axis, const DriveDescriptor& drive,
                         : fmt::format("for {} ms", capabilities.fixed_deceleration);
   lines.push_back(fmt::format(
       "axis {}: object 6084h is only read: the drive brakes {}, whatever it is told: from limits.velocity {} "
-      "{}/s that takes {:.2g} s and {:.2g} {}{}",
-      axis.name, ramp, format_number(limits.velocity), axis.scale.unit, in_seconds(time),
-      limits.velocity * in_seconds(time) / 2, axis.scale.unit,
+      "{}/s that takes {} s and {} {}{}",
+      axis.name, ramp, format_number(limits.velocity), axis.scale.unit, to_a_tenth(in_seconds(time)),
+      to_a_tenth(limits.velocity * in_seconds(time) / 2), axis.scale.unit,
       capabilities.quick_stop_ramp == QuickStopRamp::of_stop ? "; QuickStop is no harder" : ""));
 }
 
