@@ -111,10 +111,10 @@ Task<> Axis::run_stop() {
     observed_.stop_failed();
     // Whether it arrived is not known: the drive is connected anew, which begins with a stop (M4).
     if (confirmed.error().outcome == Outcome::unknown) bus_lost(confirmed.error());
-    // Nothing of this run has reached the drive: it gets the stop that is owed when it is connected, and what
-    // it does until it rests is judged then (M4).
-    const bool never_reached = !identity_ && !env_.bus->port().open;
-    if (!fault_ && !never_reached) fault_ = confirmed.error();
+    // Nothing that this daemon began can go on in a drive that it has never heard: it gets the stop that is
+    // owed when it is connected, and comes online once it rests (M4).
+    const bool never_heard = !identity_ && confirmed.error().outcome == Outcome::unknown;
+    if (!fault_ && !never_heard) fault_ = confirmed.error();
     log_about_axis(spdlog::level::err, LogKind::stop_unconfirmed, settings_, to_string(confirmed.error()));
     for (const auto& command : commands) {
       if (link_.offline())

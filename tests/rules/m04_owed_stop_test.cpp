@@ -225,6 +225,38 @@ TEST(M04, AStopForAPortThatIsNotThereIsOwedUntilItIs) {
   }
 }
 
+TEST(M04, AStopForADriveThatHasNotBootedYetIsOwedToIt) {
+  Rig rig({.limits = false});
+  rig.ready();
+  rig.kill_daemon();
+  rig.drive->set_power(false);
+  rig.start_daemon(false);
+  const auto stops = rig.machine->stop_all("hmi");
+  ASSERT_TRUE(stops.at(0));
+  const auto& stop = *stops[0];
+  ASSERT_TRUE(rig.run_until([&] { return stop->has_ended(); }, 5s));
+  EXPECT_EQ(stop->value().state, CommandState::unknown) << "nobody answered";
+  EXPECT_GE(rig.writes_of(0x0028), 1);
+  EXPECT_NE(rig.state()->state, AxisState::error_stop);
+  rig.run(2s);
+  rig.drive->advance(rig.world.now());
+  rig.drive->set_power(true);
+  rig.line->forget_wire();
+  expect_held_at_rest(rig);
+  EXPECT_GE(rig.writes_of(0x0028), 1) << "it is owed still";
+}
+
+TEST(M04, OfADriveThatWasHeardAnUnknownStopIsAFault) {
+  Rig rig({.limits = false});
+  rig.ready();
+  cut_cable(rig);
+  const auto stop = rig.submit(StopRequest{});
+  ASSERT_TRUE(rig.run_until([&] { return stop->has_ended(); }, 5s));
+  EXPECT_EQ(stop->value().state, CommandState::unknown);
+  restore_cable(rig);
+  EXPECT_EQ(rig.state()->state, AxisState::error_stop);
+}
+
 TEST(M04, ADriveThatGoesOnUnderTheStopThatWasOwedSinceTheStartIsNotAtRest) {
   Rig rig({.limits = false});
   const auto stops = stopped_at_start(rig, true, true);
