@@ -14,6 +14,7 @@ LOADER_ONLY = {
     "canopen_models",
     "device_nodes",
     "device_same_address",
+    "empty_range",
     "function_twice",
     "function_twice_inverted",
     "group_axes",
@@ -27,6 +28,9 @@ LOADER_ONLY = {
     "listen_port",
     "merge_key",
     "metrics",
+    "metrics_at_listen",
+    "metrics_at_stop_listen",
+    "metrics_at_stops",
     "model_on_wrong_bus",
     "missing_travel",
     "misspelt_unit",
@@ -58,7 +62,7 @@ LOADER_ONLY = {
     "velocity_too_low",
     "vertical",
 }
-UNREADABLE = {"alias_loop", "two_documents", "syntax_bracket", "syntax_indent", "syntax_tab"}
+UNREADABLE = {"alias_loop", "brace_too_many", "two_documents", "syntax_bracket", "syntax_indent", "syntax_tab"}
 
 
 def as_json(value, done):
