@@ -49,8 +49,8 @@ int restore_state(const std::string& file, const std::filesystem::path& director
   }
   std::cout << fmt::format(
       "{}: restored as generation {}. Start axisd, look at the machine, then 'axisctl state accept': until "
-      "then "
-      "motion waits. StopAll is latched, and positions have to be homed again\n",
+      "then motion waits. StopAll is latched, commands are refused for 10 minutes (axisctl state), and "
+      "positions have to be homed again\n",
       directory.string(), restored->number);
   return exit_status::in_order;
 }

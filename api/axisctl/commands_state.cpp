@@ -96,7 +96,7 @@ void kept_state(Invocation& invocation) {
   const auto info =
       invocation.client().call(&v1::SystemService::Stub::GetInfo, v1::GetInfoRequest(), std::string_view());
   if (info.has_storage_error())
-    print_line("requests:   " + coloured(describe(info.storage_error()), Colour::yellow, use_colour()));
+    print_line("commands:   " + coloured(describe(info.storage_error()), Colour::yellow, use_colour()));
 }
 
 void accept_state(Invocation& invocation) {

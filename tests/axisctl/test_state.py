@@ -95,7 +95,7 @@ class Axisctl(AxisctlTest):
         self.assertIn(f"motion:     {full}\n", self.ok("info"))
         self.server.machine.convict()
         self.assertIn(f": {TEXT}; {full}\n", self.ok("info"))
-        self.assertIn("requests:   the latch would not outlive a restart; free space on the disk\n", self.ok("state"))
+        self.assertIn("commands:   the latch would not outlive a restart; free space on the disk\n", self.ok("state"))
 
 
 class Python(PythonTest):
