@@ -31,6 +31,7 @@ struct Activity {
   TimePoint waits_since{};                ///< the time from which start_by counts
   Clock::Timer late{};                    ///< at start_by
   StartTurns::Turn turn{};                ///< of its start, until that was sent
+  int number = 0;                         ///< of its start, for UnseenStart
   std::optional<MotionMachine> motion{};  ///< once its start was acknowledged, and it is followed
 };
 using ActivityPtr = std::shared_ptr<Activity>;

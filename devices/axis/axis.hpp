@@ -43,6 +43,7 @@
 #include "devices/axis/terminal_motion.hpp"
 #include "devices/axis/terminals.hpp"
 #include "devices/axis/unknown_outcomes.hpp"
+#include "devices/axis/unseen_start.hpp"
 #include "devices/descriptor.hpp"
 #include "devices/drive.hpp"
 
@@ -381,6 +382,7 @@ class Axis {
   void end_at_rest(Activity& activity);
   [[nodiscard]] bool shows(const Plan& plan, std::int64_t base) const;
   [[nodiscard]] bool held_back(const Plan& plan) const;
+  [[nodiscard]] bool is_astray(const Plan& plan, std::int64_t base) const;
   Task<std::optional<TimePoint>> arrived(ActivityPtr activity, std::int64_t base, TimePoint since);
   Task<bool> is_no_reboot(ActivityPtr activity);
   Task<bool> still_there(ActivityPtr activity);
@@ -446,9 +448,9 @@ class Axis {
   void note_stop_sent(TimePoint end, bool answered);
   Task<Result<void>> stop_and_confirm();
   [[nodiscard]] Error not_stopped(StopMachine::Step step, const Result<void>& sent) const;
-  Task<bool> rests_in_time(bool acknowledged);
+  Task<RestVerdict> rests_in_time(bool acknowledged, TimePoint since);
   [[nodiscard]] Duration braking_time(StopKind kind) const;
-  Task<bool> standstill_by(TimePoint since, TimePoint deadline);
+  Task<RestVerdict> standstill_by(bool acknowledged, TimePoint deadline);
   Task<bool> standstill_unpolled(TimePoint deadline, bool of_stop);
   void leave_running(const Activity& activity);
   [[nodiscard]] Error error(Reason reason, std::string message, std::string remedy = {}) const;
@@ -485,6 +487,7 @@ class Axis {
 
   AxisLife life_;
   StopMachine stop_;
+  UnseenStart unseen_start_;
   PowerMachine power_;
 
   std::optional<DriveSample> sample_;

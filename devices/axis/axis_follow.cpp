@@ -194,7 +194,18 @@ MotionMachine::Reading Axis::reading_of(const Plan& plan, std::int64_t base) con
           .moving = sample_->moving,
           .elsewhere = moved_from(base),
           .at_target = !plan.endless && is_at(*plan.target),
-          .held_back = held_back(plan)};
+          .held_back = held_back(plan),
+          .astray = is_astray(plan, base)};
+}
+
+/// The drive executes another motion, such as the one that this one replaced: the shaft is behind `base`, or
+/// beyond the target, by more than it settles or is turned as it is taken hold of.
+bool Axis::is_astray(const Plan& plan, std::int64_t base) const {
+  const auto margin = std::max(settings_.scale.pulses_per_revolution / 8, 8 * drive_->position_window());
+  const auto way = plan.endless ? 0 : plan.target->counter - base;
+  const bool positive = plan.endless ? plan.positive != settings_.scale.invert : way > 0;
+  const auto gone = positive ? tracker_.counter() - base : base - tracker_.counter();
+  return gone < -margin || (!plan.endless && gone > std::abs(way) + margin);
 }
 
 /// Watches a motion until it ends. True: it rests at the plan's target. False: the activity has ended
@@ -239,6 +250,10 @@ void Axis::end_motion(Activity& activity, MotionMachine::State state) {
     case MotionMachine::State::taken_over:
       return fail_with_stop(activity, error(Reason::terminal, "a terminal of the drive took over the motion",
                                             "check the terminals"));
+    case MotionMachine::State::astray:
+      return fail_with_stop(activity,
+                            error(Reason::not_reached, "the drive moves away from its target; stopped",
+                                  "look at the machine; check for other masters on the bus"));
     case MotionMachine::State::did_not_start:
       return fail_with_stop(activity,
                             error(Reason::did_not_start, "the drive accepted the start but does not move",

@@ -250,7 +250,18 @@ Task<Result<TimePoint>> Axis::Member::trigger(TimePoint not_after) {
   }
 }
 
+void Axis::Member::about_to_start() {
+  activity_->start.about_to_start();
+  activity_->number = axis_->unseen_start_.sending(base_);
+}
+
+void Axis::Member::not_started() {
+  activity_->start.not_started();
+  axis_->unseen_start_.not_sent(activity_->number);
+}
+
 void Axis::Member::started(TimePoint at) {
+  axis_->unseen_start_.sent(activity_->number, axis_->env_.clock->now());
   started_at_ = at;
   activity_->start.begun();
   axis_->watch_speed(SpeedWatch::Event::begun);

@@ -136,7 +136,8 @@ bool Axis::found_by_terminal() const {
 /// M4: a drive found moving without a live command is stopped, unless a terminal started it.
 Task<Result<void>> Axis::settle_found_motion() {
   std::string_view found = stop_.owed() ? "the stop that was owed to it was sent, and it came to rest" : "";
-  if (found_in_motion() && !found_by_terminal()) {
+  const bool may_move = found_in_motion() || (unseen_start_.may_begin() && stop_.left_running());
+  if (may_move && !found_by_terminal()) {
     if (!stop_.owed() && sample_->moving) {  // else it may rest between the phases of homing, or for good
       log_about_axis(spdlog::level::warn, LogKind::moving_without_command, settings_,
                      fmt::format("{}: found moving; stopping it", settings_.name));
@@ -331,6 +332,7 @@ void Axis::on_reboot(const Error& cause) {
   if (activity_ && activity_->start.may_run()) told.outcome = Outcome::unknown;  // it may have started before
   supersede(told);
   stop_.restarted();
+  unseen_start_.restarted();
   lose_trust();
   tracker_.restart(sample_ ? sample_->position_pulses : 0);
   publish();

@@ -177,9 +177,13 @@ Task<bool> Axis::positioned(ActivityPtr activity) {
     there = result && tracker_.rests_at(target);
     if (result && !there) {
       activity->plan.predicted = planner_.duration(activity->plan, target.counter - base);
+      activity->number = unseen_start_.sending(base);
       if (may_move_by_itself()) {
         auto triggered = co_await start_unmoved(activity);
-        if (!triggered) co_return false;
+        if (!triggered) {
+          unseen_start_.not_sent(activity->number);
+          co_return false;
+        }
         result = *std::move(triggered);
         base = tracker_.counter();
       } else {
@@ -249,7 +253,10 @@ Task<> Axis::run_velocity(ActivityPtr activity) {
     if (activity->turn) result = co_await look(settings_.reboot_guard);  // it may have waited long
     if (!current(*activity) || !may_start(*activity)) co_return;
     base = tracker_.counter();
-    if (result) result = co_await drive_->start_velocity(profile, guard(*activity));
+    if (result) {
+      activity->number = unseen_start_.sending(base);
+      result = co_await drive_->start_velocity(profile, guard(*activity));
+    }
   }
   result ? activity->turn.done() : activity->turn.leave();
   const auto since = env_.clock->now();
@@ -268,8 +275,13 @@ void Axis::end_unsent(Activity& activity, Error cause) {
 /// What became of a start. True: it was executed. A trigger of which the reply does not say so is never sent
 /// again: the drive is read back until it shows what it did (M8).
 Task<bool> Axis::started(ActivityPtr activity, Result<void> result, std::int64_t base, TimePoint since) {
+  const bool sent = result || result.error().outcome == Outcome::unknown;
+  if (sent)
+    unseen_start_.sent(activity->number, since);
+  else
+    unseen_start_.not_sent(activity->number);
   if (!current(*activity)) co_return false;
-  if (result || result.error().outcome == Outcome::unknown) activity->start.begun();
+  if (sent) activity->start.begun();
   watch_speed(SpeedWatch::Event::begun);
   if (result) {
     // A proof was part of it, no longer than `reboot_guard` before the trigger; that has its reply since.

@@ -90,6 +90,7 @@ Duration Axis::braking_time(StopKind kind) const {
 /// of the motion before it in force.
 void Axis::leave_running(const Activity& activity) {
   if (!activity.start.may_run()) return;
+  unseen_start_.left(env_.clock->now());
   const auto& plan = activity.plan;
   stop_.set_deceleration(
       std::max(plan.deceleration_time, plan.granted.deceleration_time.value_or(Duration{})));
@@ -154,8 +155,11 @@ Error Axis::not_stopped(StopMachine::Step step, const Result<void>& sent) const 
 
 Task<Result<void>> Axis::stop_and_confirm() {
   using Step = StopMachine::Step;
+  StopKind last = StopKind::none;
+  std::optional<TimePoint> unanswered;  // since when stops of that kind are sent without a reply
   for (;;) {
     const auto kind = stop_.next_attempt();
+    if (std::exchange(last, kind) != kind) unanswered.reset();
     const auto sent = co_await drive_->stop(kind);
     // Open loop: a stop without a ramp may have lost steps (M12), also one of which only the reply was lost.
     const bool may_have_come = sent || sent.error().outcome == Outcome::unknown;
@@ -164,8 +168,11 @@ Task<Result<void>> Axis::stop_and_confirm() {
     if (const auto out = drive_->stop_sent_at()) note_stop_sent(*out, sent.has_value());
     auto step = stop_.sent(answer_of(sent), link_.offline());
     if (step == Step::look) {
-      const bool rests = co_await rests_in_time(sent.has_value());
-      step = stop_.looked(rests, link_.offline(), settings_.stop_escalation_release);
+      const auto now = env_.clock->now();
+      if (sent) unanswered.reset();
+      if (!sent && !unanswered) unanswered = now;
+      const auto found = co_await rests_in_time(sent.has_value(), unanswered.value_or(now));
+      step = stop_.looked(found, link_.offline(), settings_.stop_escalation_release);
     }
     switch (step) {
       case Step::send:
@@ -192,31 +199,35 @@ Task<Result<void>> Axis::stop_and_confirm() {
   }
 }
 
-/// After a stop frame, which was acknowledged or not.
-Task<bool> Axis::rests_in_time(bool acknowledged) {
-  const auto since = env_.clock->now();
-  const auto patience = stop_.patience(settings_.stop_margin, braking_time(StopKind::quick_stop));
-  poll_fast(since, patience);
+/// After a stop frame, which was acknowledged or not. `since`: the first of those that were not. Undecided:
+/// it moves, and none of them may have arrived.
+Task<RestVerdict> Axis::rests_in_time(bool acknowledged, TimePoint since) {
+  const auto now = env_.clock->now();
+  const auto deadline = since + stop_.patience(settings_.stop_margin, braking_time(StopKind::quick_stop));
+  poll_fast(now, std::max<Duration>(deadline - now, start_window));
   // Only an axis that is online is polled: not one whose drive was restarted meanwhile.
   if (link_.online()) {
-    const bool rests = co_await standstill_by(since, since + patience);
-    if (rests || link_.shown() != LinkState::configuring || stop_.overtaken()) co_return rests;
+    const auto found = co_await standstill_by(acknowledged, deadline);
+    const bool polled = found == RestVerdict::rests || link_.shown() != LinkState::configuring;
+    if (polled || stop_.overtaken()) co_return found;
   } else if (!acknowledged && link_.offline()) {
-    co_return false;
+    co_return RestVerdict::moves;
   }
-  co_return co_await standstill_unpolled(since + patience, true);
+  co_return co_await standstill_unpolled(deadline, true) ? RestVerdict::rests : RestVerdict::moves;
 }
 
-Task<bool> Axis::standstill_by(TimePoint since, TimePoint deadline) {
+Task<RestVerdict> Axis::standstill_by(bool acknowledged, TimePoint deadline) {
+  const auto since = env_.clock->now();
   StandstillWatch watch(since, deadline);
   while (link_.online() && !stop_.overtaken()) {
-    if (sample_) {
+    if (sample_ && !unseen_start_.may_begin()) {
       const auto found = watch.look(*sample_, tracker_.counter(), drive_->position_window());
-      if (found != RestVerdict::undecided) co_return found == RestVerdict::rests;
+      if (found != RestVerdict::undecided) co_return found;
+      if (!acknowledged && sample_->moving && sample_->asked_at >= since) co_return RestVerdict::undecided;
     }
     co_await sampled_.wait();
   }
-  co_return false;
+  co_return RestVerdict::moves;
 }
 
 /// The same for a node that nobody polls, because it is not (or not yet) online. What its samples tell beside
@@ -229,8 +240,11 @@ Task<bool> Axis::standstill_unpolled(TimePoint deadline, bool of_stop) {
     const auto sample = co_await drive_->read_state(TransactionClass::moving_state);
     if (sample) on_sample(*sample);
     if (another()) co_return false;
-    const auto found =
-        sample ? watch.look(*sample, tracker_.counter(), drive_->position_window()) : watch.silence();
+    auto found = RestVerdict::undecided;
+    if (!sample)
+      found = watch.silence();
+    else if (!unseen_start_.may_begin())
+      found = watch.look(*sample, tracker_.counter(), drive_->position_window());
     if (found != RestVerdict::undecided) co_return found == RestVerdict::rests;
     // Samples of somebody else who looks do not shorten it.
     for (const auto until = env_.clock->now() + pause; !another() && env_.clock->now() < until;)

@@ -60,9 +60,9 @@ class Axis::Member {
   /// As Bus::hold().
   [[nodiscard]] std::shared_ptr<void> hold_bus() const { return axis_->env_.bus->hold(); }
   /// From now on its start may have been sent.
-  void about_to_start() { activity_->start.about_to_start(); }
+  void about_to_start();
   /// It is known that it was not.
-  void not_started() { activity_->start.not_started(); }
+  void not_started();
   /// Starts that by SYNC are bound until then: shortly after a reading, where something else could have
   /// turned the shaft; max() elsewhere. Errors: of look().
   Task<Result<TimePoint>> look_again();

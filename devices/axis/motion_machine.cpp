@@ -33,6 +33,7 @@ MotionMachine::State MotionMachine::look(const Reading& reading) {
   if (state_ == State::starting && unseen_end) state_ = State::running;
   if (!reading.positioning) return state_ = State::taken_over;
   if (reading.moving) {
+    if (reading.astray) return state_ = State::astray;
     rests_since_.reset();
     if (state_ == State::settling) state_ = State::running;
   } else {

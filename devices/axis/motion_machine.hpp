@@ -23,6 +23,7 @@ inline constexpr Duration start_window = std::chrono::milliseconds(500);
 ///   running, settling -- held back, or longer than a shaft settles --------> rests_elsewhere
 ///   arrived  -- go_on(): something has moved it since ---------------------> running
 ///   starting, running, settling -- another mode of the drive --------------> taken_over
+///   any of these -- moves away from its target -----------------------------> astray
 ///   running, settling -- far longer than predicted ------------------------> took_too_long
 class MotionMachine {
  public:
@@ -34,6 +35,7 @@ class MotionMachine {
     // It has ended otherwise:
     rests_elsewhere,
     taken_over,
+    astray,  ///< it executes another motion than this one
     did_not_start,
     took_too_long,
   };
@@ -51,6 +53,7 @@ class MotionMachine {
     bool elsewhere = false;  ///< than where it started
     bool at_target = false;  ///< of a motion that has one
     bool held_back = false;  ///< by a limit or a stop terminal
+    bool astray = false;     ///< further from where it started, or from its target, than this motion goes
   };
 
   explicit MotionMachine(const Motion& motion) : motion_(motion) {}

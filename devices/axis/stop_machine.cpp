@@ -53,8 +53,10 @@ StopMachine::Step StopMachine::sent(Answer answer, bool offline) {
   return go_to(State::confirming, Step::look);
 }
 
-StopMachine::Step StopMachine::looked(bool rests, bool offline, bool may_release) {
-  if (overtaken()) return go_to(State::sending, Step::send);  // each gets a frame of its own
+StopMachine::Step StopMachine::looked(RestVerdict found, bool offline, bool may_release) {
+  const bool rests = found == RestVerdict::rests;
+  if (overtaken() || found == RestVerdict::undecided)
+    return go_to(State::sending, Step::send);  // each gets a frame of its own
   if (rests && attempt_.answer == Answer::no_reply && ++rounds_ < unacknowledged_rounds)
     return go_to(State::sending, Step::send);
   if (rests) return Step::rests;

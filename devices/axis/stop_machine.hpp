@@ -11,6 +11,7 @@
 #include "buses/clock.hpp"
 #include "buses/gate.hpp"
 #include "devices/axis/command_record.hpp"
+#include "devices/axis/standstill.hpp"
 #include "devices/axis/stop_holds.hpp"
 
 namespace axisd {
@@ -26,6 +27,7 @@ namespace axisd {
 ///   sending    -- sent(): out of reach, but another was asked for -> sending
 ///   sending    -- sent(): any other reply, or silent so often -----> confirming
 ///   confirming -- looked(): another was asked for -----------------> sending
+///   confirming -- looked(): moves, and no stop may have arrived ---> sending
 ///   confirming -- looked(): rests, but never acknowledged ---------> sending, three times
 ///   confirming -- looked(): moves, not yet told to stop quickly ---> sending, a quick stop
 ///   confirming -- looked(): moves, and the release is permitted ---> releasing
@@ -94,8 +96,9 @@ class StopMachine {
   StopKind next_attempt();
   /// `offline`: nobody is connected to the drive.
   Step sent(Answer answer, bool offline);
+  /// `found`: undecided where it moves, no stop was acknowledged, and patience() is not over yet.
   /// `may_release`: the configuration permits it (stop_escalation).
-  Step looked(bool rests, bool offline, bool may_release);
+  Step looked(RestVerdict found, bool offline, bool may_release);
   /// The sequence has ended; its commands, which end with it.
   std::vector<CommandPtr> confirmed();
   std::vector<CommandPtr> failed();

@@ -75,7 +75,8 @@ void SimulatedDrive::power_up() {
   alarm_ = cause_;
   activity_ = last_activity_ = Activity::none;
   multi_speed_on_ = stopping_ = false;
-  segment_due_ = clear_due_ = homing_due_ = TimePoint::max();
+  segment_due_ = clear_due_ = homing_due_ = start_due_ = TimePoint::max();
+  later_.reset();
   terminals_.settle(motor_.shaft(), memory_);
 }
 
@@ -124,7 +125,8 @@ void SimulatedDrive::advance(TimePoint now) {
 TimePoint SimulatedDrive::next_event() const {
   if (!powered_) return TimePoint::max();
   if (boot_end_) return *boot_end_;
-  auto next = std::min({motor_.ends(), terminals_.next_event(), segment_due_, clear_due_, homing_due_});
+  auto next =
+      std::min({motor_.ends(), terminals_.next_event(), segment_due_, clear_due_, homing_due_, start_due_});
   if (motor_.moving()) {
     const auto change = terminals_.next_switch(motor_.shaft(), motor_.direction());
     if (change) next = std::min(next, motor_.reaches(*change));
@@ -149,6 +151,7 @@ void SimulatedDrive::step(TimePoint now) {
   if (ended && !motor_.moving()) on_stopped();
   if (homing_due_ <= now) homing_stopped();
   if (segment_due_ <= now) start_segment();
+  if (start_due_ <= now) start_now();
   if (clear_due_ <= now) {
     clear_due_ = TimePoint::max();
     motor_.clear_counter();

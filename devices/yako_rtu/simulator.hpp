@@ -101,6 +101,8 @@ class SimulatedDrive final : public simulation::SimulatedRtuNode {
   [[nodiscard]] Fail refusal() const;
   Fail start(std::uint16_t command);
   Fail begin(const Plan& plan);
+  bool starts_later(const Plan& plan);
+  void start_now();
   void launch(const Plan& plan);
   void stop_command(bool emergency);
   void stop_motion(bool emergency);
@@ -118,6 +120,7 @@ class SimulatedDrive final : public simulation::SimulatedRtuNode {
 
   // simulator_homing.cpp
   Fail start_homing();
+  void begin_homing();
   void homing_edge(const InputEdge& edge);
   void homing_limits();
   void homing_stopped();
@@ -150,10 +153,12 @@ class SimulatedDrive final : public simulation::SimulatedRtuNode {
   Activity activity_ = Activity::none;
   Activity last_activity_ = Activity::none;  ///< what was started last
   std::optional<Plan> pending_;              ///< begins when the motor has stopped
-  std::int64_t last_target_ = 0;             ///< shaft position of the last position move
-  bool stopping_ = false;                    ///< the motion will not complete
-  bool multi_speed_on_ = false;              ///< PV is enabled
-  int multi_speed_rpm_ = 0;                  ///< signed, what PV runs at
+  std::optional<Plan> later_;                ///< begins at start_due_
+  TimePoint start_due_ = TimePoint::max();
+  std::int64_t last_target_ = 0;  ///< shaft position of the last position move
+  bool stopping_ = false;         ///< the motion will not complete
+  bool multi_speed_on_ = false;   ///< PV is enabled
+  int multi_speed_rpm_ = 0;       ///< signed, what PV runs at
   TimePoint pins_changed_{};
   TimePoint segment_due_ = TimePoint::max();  ///< PT start, 5 ms after its edge
   TimePoint clear_due_ = TimePoint::max();    ///< 0x002C takes effect

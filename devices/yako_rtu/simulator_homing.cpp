@@ -31,7 +31,13 @@ Fail SimulatedDrive::start_homing() {
   if (!behaviour_.stop_terminal_only_edge &&
       (terminals_.active(Input::stop) || terminals_.active(Input::emergency_stop)))
     return Fail::none;
+  if (starts_later({.activity = Activity::homing})) return Fail::none;
   ++starts_;
+  begin_homing();
+  return Fail::none;
+}
+
+void SimulatedDrive::begin_homing() {
   activity_ = last_activity_ = Activity::homing;
   homing_due_ = TimePoint::max();
   in_position_ = stopping_ = false;
@@ -41,11 +47,10 @@ Fail SimulatedDrive::start_homing() {
   if (behaviour_.homing_accepts_active_switch && terminals_.active(homing_reference())) {
     phase_ = Phase::back_off;
     homing_run(-approach_direction(), memory_.get(reg::homing_search_speed));
-    return Fail::none;
+    return;
   }
   phase_ = Phase::search;
   homing_run(homing_direction_, memory_.get(reg::homing_speed));
-  return Fail::none;
 }
 
 void SimulatedDrive::homing_edge(const InputEdge& edge) {

@@ -2,6 +2,7 @@
 // (7.3, 7.4).
 #include <algorithm>
 #include <cstdlib>
+#include <utility>
 
 #include "devices/yako_rtu/simulator.hpp"
 
@@ -67,9 +68,28 @@ Fail SimulatedDrive::begin(const Plan& plan) {
     if (!behaviour_.start_in_motion || !replaceable) return Fail::none;
   }
   if (plan.rates.cruise <= 0 || blocked(plan.direction)) return Fail::none;
+  if (starts_later(plan)) return Fail::none;
   ++starts_;
   launch(plan);
   return Fail::none;
+}
+
+/// The manual says nothing of the time between a start's reply and the first pulse. A second start in it does
+/// nothing, as one in motion.
+bool SimulatedDrive::starts_later(const Plan& plan) {
+  if (!behaviour_.starts_late || motor_.moving()) return false;
+  if (later_) return true;
+  later_ = plan;
+  start_due_ = now_ + std::chrono::milliseconds(80);
+  return true;
+}
+
+void SimulatedDrive::start_now() {
+  start_due_ = TimePoint::max();
+  const auto plan = *std::exchange(later_, std::nullopt);
+  if (!enabled() || alarm_ != 0 || motor_.moving()) return;
+  ++starts_;
+  plan.activity == Activity::homing ? begin_homing() : launch(plan);
 }
 
 void SimulatedDrive::launch(const Plan& plan) {

@@ -26,6 +26,9 @@ bool keeps_overtravel_in_ram(const SimulatedModel& model) { return !model.overtr
 
 // clang-format off
 constexpr Entry entries[] = {
+    {{"starts_late", false,
+      "the motor begins 80 ms after a start was acknowledged, and a stop before that does nothing; off: at once"},
+     &Behaviour::starts_late},
     {{"start_in_motion", false,
       "a start while moving takes over from the present speed; off: acknowledged and ignored"},
      &Behaviour::start_in_motion},

@@ -8,6 +8,7 @@
 namespace axisd::yako_rtu {
 
 struct Behaviour {
+  bool starts_late;
   bool start_in_motion, start_in_motion_refused, start_in_motion_from_target;
   bool one_frame_start, one_frame_start_refused;
   bool start_refused_when_disabled, reserved_start_refused, reserved_start_moves;

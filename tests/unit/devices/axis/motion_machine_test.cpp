@@ -200,5 +200,18 @@ TEST(StartReadback, WhatIsSupersededOrNotProvenIsUnresolved) {
   EXPECT_EQ(resting.superseded(), Readback::unresolved);
 }
 
+TEST(MotionMachine, WhatMovesAwayFromItsTargetIsAnotherMotion) {
+  Followed starting, running, resting;
+  const auto astray = [](Followed& followed, bool moving) {
+    return followed.machine.look(
+        {.asked_at = started + 20ms, .moving = moving, .elsewhere = true, .astray = true});
+  };
+  EXPECT_EQ(astray(starting, true), State::astray);
+  running.moves(10ms);
+  EXPECT_EQ(astray(running, true), State::astray);
+  resting.moves(10ms);
+  EXPECT_EQ(astray(resting, false), State::settling) << "its rest decides";
+}
+
 }  // namespace
 }  // namespace axisd

@@ -26,7 +26,9 @@ class StopMachineTest : public testing::Test {
     EXPECT_EQ(stop_.sent(Answer::acknowledged, false), Step::look);
     return kind;
   }
-  Step looked(bool rests, bool may_release = false) { return stop_.looked(rests, false, may_release); }
+  Step looked(bool rests, bool may_release = false) {
+    return stop_.looked(rests ? RestVerdict::rests : RestVerdict::moves, false, may_release);
+  }
   CommandPtr command(std::string client = {}) {
     return std::make_shared<CommandRecord>(Command{.client = std::move(client)}, world_.clock());
   }
@@ -99,6 +101,18 @@ TEST_F(StopMachineTest, AStopWithoutAReplyIsRepeatedTwiceAndThenLookedAfter) {
   stop_.next_attempt();
   EXPECT_EQ(stop_.sent(Answer::no_reply, false), Step::look);
   EXPECT_EQ(stop_.state(), State::confirming);
+}
+
+TEST_F(StopMachineTest, WhatMovesThoughNoStopMayHaveArrivedIsStoppedAgain) {
+  begin(StopKind::stop);
+  for (int round = 0; round < 10; ++round) {
+    for (int attempt = 0; attempt < StopMachine::attempts; ++attempt) {
+      EXPECT_EQ(stop_.next_attempt(), StopKind::stop) << "no stronger one";
+      stop_.sent(Answer::no_reply, false);
+    }
+    EXPECT_EQ(stop_.looked(RestVerdict::undecided, false, true), Step::send);
+    EXPECT_EQ(stop_.state(), State::sending);
+  }
 }
 
 TEST_F(StopMachineTest, AStopThatCannotBeSentFails) {
@@ -193,7 +207,7 @@ TEST_F(StopMachineTest, WhatMovesAfterAQuickStopFailsWhereNoReleaseIsPermitted) 
 TEST_F(StopMachineTest, ADriveThatFallsSilentIsNotEscalated) {
   begin(StopKind::stop);
   send();
-  EXPECT_EQ(stop_.looked(false, true, true), Step::fell_silent);
+  EXPECT_EQ(stop_.looked(RestVerdict::moves, true, true), Step::fell_silent);
 }
 
 TEST_F(StopMachineTest, EachSequenceEscalatesAnew) {

@@ -1,0 +1,102 @@
+// A drive that begins some time after it has acknowledged a start, and ignores what stops it before (M13,
+// M14).
+#include <gtest/gtest.h>
+
+#include "tests/support/rig.hpp"
+
+namespace axisd::test {
+namespace {
+
+using namespace std::chrono_literals;
+using simulation::FaultKind;
+
+const RigOptions starts_late{.switches = {{"starts_late", true}}};
+
+/// Every so often a stop may come between a start's acknowledgement and 150 ms later.
+const std::vector<Duration> after_start{0ms, 1ms, 5ms, 15ms, 40ms, 70ms, 79ms, 81ms, 90ms, 150ms};
+
+TEST(M14, AStopIsNotDoneBeforeTheMotionThatItStopsCannotBeginAnyMore) {
+  for (const Action& motion : std::vector<Action>{MoveAbsoluteRequest{.position = 300}, HomeRequest{},
+                                                  MoveVelocityRequest{.velocity = 50}})
+    for (const auto kind : {StopKind::halt, StopKind::stop})
+      for (const auto delay : after_start) {
+        SCOPED_TRACE(testing::Message()
+                     << to_string(kind_of(motion)) << ", " << delay.count() / 1e6 << " ms");
+        Rig rig(starts_late);
+        rig.ready();
+        const auto command = rig.submit(motion);
+        ASSERT_TRUE(rig.run_until([&] { return command->value().state == CommandState::active; }, 1s));
+        rig.run(delay);
+        const auto stop = rig.complete(StopRequest{.kind = kind});
+        EXPECT_EQ(stop.state, CommandState::done) << describe(stop);
+        rig.drive->advance(rig.world.now());
+        EXPECT_FALSE(rig.drive->shaft_moving()) << "told at rest";
+        const auto where = rig.drive->shaft_pulses();
+        rig.run(3s);
+        EXPECT_EQ(rig.drive->shaft_pulses(), where) << "it has moved after its stop was done";
+        EXPECT_EQ(rig.state()->state, AxisState::standstill);
+      }
+}
+
+TEST(M9, AMotionThatIsReplacedBeforeItBeginsIsNotExecutedInItsPlace) {
+  for (const auto delay : after_start) {
+    SCOPED_TRACE(testing::Message() << delay.count() / 1e6 << " ms");
+    Rig rig(starts_late);
+    rig.ready();
+    ASSERT_EQ(rig.complete(MoveAbsoluteRequest{.position = 100}).state, CommandState::done);
+    const auto first = rig.submit(MoveAbsoluteRequest{.position = 300});
+    ASSERT_TRUE(rig.run_until([&] { return first->value().state == CommandState::active; }, 1s));
+    rig.run(delay);
+    const auto second = rig.complete(MoveAbsoluteRequest{.position = 80});
+    EXPECT_EQ(second.state, CommandState::done) << describe(second);
+    EXPECT_EQ(first->value().state, CommandState::aborted);
+    EXPECT_NEAR(rig.state()->position, 80, 0.01);
+  }
+}
+
+TEST(M10, AMotionThatGoesTheWrongWayIsStopped) {
+  Rig rig;
+  rig.ready();
+  ASSERT_EQ(rig.complete(MoveAbsoluteRequest{.position = 100}).state, CommandState::done);
+  const auto move = rig.submit(MoveAbsoluteRequest{.position = 300, .with = {.velocity = 50}});
+  rig.run(500ms);
+  const auto where = rig.state()->position;
+  // As if the drive executed another motion than this one.
+  rig.write_behind(0x0028, 0);
+  ASSERT_TRUE(rig.run_until([&] { return !rig.drive->shaft_moving(); }, 2s));
+  rig.write_behind(0x0024, 0xFFFF);
+  rig.write_behind(0x0025, 0x8000);
+  rig.write_behind(0x0027, 1);
+  ASSERT_TRUE(rig.run_until([&] { return move->has_ended(); }, 5s));
+  EXPECT_EQ(move->value().state, CommandState::error) << describe(move->value());
+  rig.run(2s);
+  EXPECT_FALSE(rig.drive->shaft_moving());
+  EXPECT_EQ(rig.state()->state, AxisState::error_stop);
+  EXPECT_GT(rig.state()->position, where - 60) << "stopped soon behind its start";
+}
+
+/// What is acknowledged may be looked after; what is not goes out again as long as the motor turns (M4).
+TEST(M13, WhileTheMotorTurnsStopsGoOutUntilOneIsAcknowledged) {
+  Rig rig;
+  rig.ready();
+  rig.submit(MoveVelocityRequest{.velocity = 80});
+  rig.run(1s);
+  for (int lost = 0; lost < 6; ++lost) rig.fault({.kind = FaultKind::drop_request, .function = 0x06});
+  const auto asked = rig.world.now();
+  const auto stop = rig.submit(StopRequest{});
+  ASSERT_TRUE(rig.run_until([&] { return stop->has_ended(); }, 5s));
+  EXPECT_EQ(stop->value().state, CommandState::done) << describe(stop->value());
+  EXPECT_EQ(rig.state()->trust, PositionTrust::set) << "no quick stop was needed";
+  TimePoint last = asked;
+  int frames = 0;
+  for (const auto& entry : rig.line->wire()) {
+    if (!entry.is_write() || entry.address() != 0x0028) continue;
+    EXPECT_LT(entry.begin - last, 60ms) << "stop frame " << frames;
+    last = entry.begin;
+    ++frames;
+  }
+  EXPECT_EQ(frames, 7);
+}
+
+}  // namespace
+}  // namespace axisd::test
