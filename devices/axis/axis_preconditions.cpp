@@ -190,6 +190,11 @@ void Axis::look_at_motion(const CommandOptions& options, Obstacles& found) const
   else if (!sample_->enabled)
     found.block(
         error(Reason::disabled, "the power stage is off", "enable the axis first: " + shell("enable")));
+  else if (power_.state() == PowerMachine::State::restarted)
+    // Whoever switched it off may have done so to reach into the machine (M1).
+    found.block(error(Reason::disabled,
+                      "the drive was switched off and on, and nobody has enabled the axis since",
+                      "see that the machine is clear, then enable the axis: " + shell("enable")));
   if (terminal_motion_.moves())
     found.block(error(Reason::terminal, "a terminal of the drive moves it",
                       fmt::format("wait, or stop it: {}", shell("stop"))));

@@ -1,11 +1,11 @@
 #include "devices/axis/power_machine.hpp"
 
-#include <utility>
-
 namespace axisd {
 
 bool PowerMachine::released(bool enabled_before) {
-  return std::exchange(state_, State::found) == State::ours || enabled_before;
+  const bool ours = state_ == State::ours;
+  if (ours) state_ = State::found;
+  return ours || enabled_before;
 }
 
 bool PowerMachine::look(const DriveSample& sample) {

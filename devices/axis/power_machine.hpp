@@ -11,8 +11,9 @@ namespace axisd {
 
 /// What is known of the power stage beside the drive's own bit. Pure. Thread: core.
 ///
-///   found -- enabled() -------------------------> ours
-///   ours  -- released(), restarted() -----------> found
+///   any   -- enabled() -------------------------> ours
+///   ours  -- released() ------------------------> found
+///   any   -- restarted() -----------------------> restarted
 ///
 /// `on_lease_loss: disable` (Release):
 ///
@@ -24,13 +25,16 @@ class PowerMachine {
   enum class State : std::uint8_t {
     found,  ///< whatever it is, no command of ours has made it so
     ours,   ///< a command of ours has enabled it
+    /// The drive was restarted, and no command of ours has enabled it since: nothing starts, though it may
+    /// have come up energised.
+    restarted,
   };
   enum class Release : std::uint8_t { none, owed };
 
   void enabled() { state_ = State::ours; }
   /// A reading shows it off. True: a command had enabled it, or the reading before showed it on.
   bool released(bool enabled_before);
-  void restarted() { state_ = State::found; }
+  void restarted() { state_ = State::restarted; }
 
   /// A reading that is asked for from `since` on shows whether it is done.
   void owe_release(TimePoint since) { release_since_ = since; }

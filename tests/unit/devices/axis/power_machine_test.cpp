@@ -29,6 +29,18 @@ TEST(PowerMachine, ARestartedDriveIsNotOurs) {
   EXPECT_FALSE(power.enabled_by_us());
 }
 
+TEST(PowerMachine, ARestartIsRememberedUntilACommandEnablesIt) {
+  PowerMachine power;
+  power.enabled();
+  power.restarted();
+  EXPECT_FALSE(power.released(false)) << "no news: nothing of ours was on";
+  EXPECT_EQ(power.state(), PowerMachine::State::restarted) << "somebody else may switch it on";
+  power.enabled();
+  EXPECT_EQ(power.state(), PowerMachine::State::ours);
+  EXPECT_TRUE(power.released(false));
+  EXPECT_EQ(power.state(), PowerMachine::State::found);
+}
+
 TEST(PowerMachine, AReleaseIsNewsOnce) {
   PowerMachine power;
   EXPECT_TRUE(power.released(true)) << "somebody else had enabled it";
