@@ -82,6 +82,11 @@ void Axis::look_at_link(Obstacles& found) const {
       cause.message = fmt::format("{}: not configured: {}", settings_.name, link_.error()->message);
       const bool lasting = cause.reason == Reason::wrong_model || cause.reason == Reason::misconfigured ||
                            cause.reason == Reason::eeprom_budget;
+      // What it asks for would only be refused for the same reason.
+      if (cause.reason == Reason::rebooted)
+        cause.remedy =
+            fmt::format("wait until it is configured again, mostly within a second; then {}, and {}",
+                        shell("enable"), settings_.homing ? shell("home") : "set its position");
       if (!lasting) cause.reason = Reason::configuring;
       cause.outcome = Outcome::not_sent;
     }

@@ -34,7 +34,7 @@ Error Cia402Drive::error_at(Reason reason, Object object, std::string message, s
 Error Cia402Drive::lost_memory() const {
   return error_at(Reason::rebooted, object::target_position,
                   "the drive lost its memory: it was switched off and on",
-                  "home the axis again, then enable it; nothing resumes by itself");
+                  "enable the axis again, then home it; nothing resumes by itself");
 }
 
 void Cia402Drive::forget_power_cycle() {

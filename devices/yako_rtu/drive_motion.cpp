@@ -37,7 +37,7 @@ void YakoRtuDrive::forget_power_cycle(const MotionBlock& block) {
 
 Error YakoRtuDrive::lost_memory() const {
   return error_at(Reason::rebooted, reg::start_speed, "the drive lost its memory: it was switched off and on",
-                  "home the axis again, then enable it; nothing resumes by itself");
+                  "enable the axis again, then home it; nothing resumes by itself");
 }
 
 MotionBlock YakoRtuDrive::distinct(const MotionBlock& block) const {

@@ -58,6 +58,19 @@ TEST(Explain, ADriveThatWasRestartedIsBeingConfigured) {
   EXPECT_THAT(rig.text(EnableRequest{}, Reason::configuring), HasSubstr("wait"));
 }
 
+/// Each of these is refused, so none may be the remedy of another.
+TEST(Explain, ARestartThatWasSeenIsWaitedFor) {
+  ExplainRig rig;
+  rig.ready();
+  rig.cycle_power(10ms);
+  ASSERT_TRUE(rig.run_until([&] { return rig.state()->reboots == 1; }, 5s));
+  ASSERT_EQ(rig.state()->link, LinkState::configuring);
+  for (const Action& action : {Action{EnableRequest{}}, Action{HomeRequest{}}, Action{ResetRequest{}}})
+    EXPECT_THAT(rig.text(action, Reason::configuring),
+                AllOf(HasSubstr("-> wait until it is configured again"),
+                      HasSubstr("then axisctl enable feeder, and axisctl home feeder")));
+}
+
 TEST(Explain, WorkOnTheDrivesMemoryIsWaitedFor) {
   ExplainRig rig;
   rig.complete(DisableRequest{});
