@@ -221,7 +221,11 @@ void Axis::look_at_holding_terminals(std::span<const std::string_view> functions
 void Axis::look_at_what_forbids_some(Obstacles& found) const {
   if (tracker_.trust() == PositionTrust::unknown &&
       (settings_.require_trust || settings_.limits.position_minimum))
-    found.note(not_trusted("the position is unknown: absolute moves are refused, and limits cannot be kept"));
+    found.note(
+        not_trusted(settings_.require_trust
+                        ? "the position is unknown: absolute moves are refused, and limits cannot be kept"
+                        : "the position is unknown: absolute moves and limits go by what the drive "
+                          "counts, wherever the load is"));
   for (const bool positive : {true, false})
     if (limit_active(positive)) found.note(direction_blocked(positive));
   if (auto possible = check_velocity_mode(); !possible) found.note(possible.error());

@@ -238,6 +238,19 @@ TEST(Explain, WhatAnAxisWithoutAPositionMayDo) {
   EXPECT_THAT(rig.reasons(MoveVelocityRequest{.velocity = 5}), ElementsAre("not_trusted"));
   EXPECT_THAT(rig.reasons(JogRequest{.velocity = 5}), IsEmpty());
   EXPECT_THAT(rig.reasons(std::nullopt), ElementsAre("(not_trusted)"));
+  EXPECT_THAT(rig.text(std::nullopt, Reason::not_trusted), HasSubstr("absolute moves are refused"));
+}
+
+TEST(Explain, WhereTrustIsWaivedAbsoluteMovesAreNotCalledRefused) {
+  ExplainRig rig({.adjust = [](AxisSettings& axis) { axis.require_trust = false; }});
+  rig.enable();
+  ASSERT_EQ(rig.state()->trust, PositionTrust::unknown);
+  EXPECT_THAT(rig.reasons(std::nullopt), ElementsAre("(not_trusted)"));
+  EXPECT_THAT(
+      rig.text(std::nullopt, Reason::not_trusted),
+      AllOf(HasSubstr("absolute moves and limits go by what the drive counts"), Not(HasSubstr("refused"))));
+  EXPECT_THAT(rig.reasons(move), IsEmpty());
+  EXPECT_EQ(rig.complete(MoveAbsoluteRequest{.position = 2}).state, CommandState::done);
 }
 
 TEST(Explain, PowerOnItsWayIsWaitedFor) {
