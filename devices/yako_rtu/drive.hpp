@@ -17,6 +17,7 @@
 #include "devices/yako_rtu/configuration.hpp"
 #include "devices/yako_rtu/mode_watch.hpp"
 #include "devices/yako_rtu/model.hpp"
+#include "devices/yako_rtu/torn_position.hpp"
 
 namespace axisd::yako_rtu {
 
@@ -93,6 +94,9 @@ class YakoRtuDrive final : public Drive {
   // drive_connection.cpp
   /// One reading of the state, in the order of the readings.
   DriveSample sample_of(std::span<const std::uint16_t> registers, TimePoint asked_at, TimePoint measured_at);
+  /// The words of its position may be of two moments: it is read again, and the second is believed.
+  [[nodiscard]] bool is_suspect(std::span<const std::uint16_t> registers, TimePoint measured_at) const;
+  Task<Result<DriveSample>> read_again(TransactionClass transaction_class);
   /// Reads what note_register() keeps: how far from its target the drive takes itself for in position, and
   /// what a start in one frame writes back.
   Task<Result<void>> read_noted();
@@ -171,6 +175,7 @@ class YakoRtuDrive final : public Drive {
   std::optional<bool> found_closed_;  ///< 0x0012 as it was before this power cycle's first write
   std::optional<std::uint16_t> terminal_move_mode_;  ///< 0x0026, if it is known
   ModeWatch mode_;
+  TornPosition torn_position_;
   /// 0x011F and the counts of a revolution by 0x0110, as the factory sets them until they were read.
   std::int64_t accuracy_ = 10, counts_per_revolution_ = 4000;
   std::set<std::uint16_t> unsaved_;  ///< saved registers that did not hold what was written

@@ -20,6 +20,12 @@ constexpr std::uint16_t segment_rows = 16;
 
 TransactionOptions in(TransactionClass transaction_class) { return {.transaction_class = transaction_class}; }
 
+/// Pulses per second, whatever the drive is told (M11).
+double highest_rate(const Capabilities& capabilities, const DriveSetup& setup) {
+  return std::min(static_cast<double>(capabilities.maximum_pulse_rate_hz),
+                  static_cast<double>(setup.pulses_per_revolution) * capabilities.maximum_rpm / 60);
+}
+
 bool is_input_function(const RegisterSetting& setting) { return setting.key.starts_with("inputs."); }
 
 std::vector<std::uint16_t> addresses_of(const std::vector<RegisterSetting>& settings) {
@@ -36,7 +42,8 @@ YakoRtuDrive::YakoRtuDrive(const Model& model, DriveContext context)
       clock_(context.clock),
       node_(*context.rtu, context.node),
       setup_(std::move(context.setup)),
-      first_input_function_(first_input_function(model, setup_)) {
+      first_input_function_(first_input_function(model, setup_)),
+      torn_position_(highest_rate(model.descriptor->capabilities, setup_)) {
   auto required = required_registers(model, setup_);
   if (required)
     required_ = std::move(*required);
@@ -135,11 +142,22 @@ DriveSample YakoRtuDrive::sample_of(std::span<const std::uint16_t> registers, Ti
   sample.asked_at = asked_at;
   sample.measured_at = measured_at;
   sample.mode = mode_.judge(sample);
+  torn_position_.believe(sample.position_pulses, asked_at);
   if (rules_out_restart(sample))
     note_proof(asked_at);
   else
     proven_at_.reset();
   return sample;
+}
+
+bool YakoRtuDrive::is_suspect(std::span<const std::uint16_t> registers, TimePoint measured_at) const {
+  return torn_position_.suspects(decode_state(registers).position_pulses, measured_at);
+}
+
+Task<Result<DriveSample>> YakoRtuDrive::read_again(TransactionClass transaction_class) {
+  const auto answer = co_await node_.read(reg::mode, state_count, in(transaction_class));
+  if (!answer) co_return failed(answer.error());
+  co_return sample_of(answer->registers, answer->sent_at, answer->answered_at);
 }
 
 Task<Result<DriveSample>> YakoRtuDrive::read_state(TransactionClass transaction_class,
@@ -148,12 +166,14 @@ Task<Result<DriveSample>> YakoRtuDrive::read_state(TransactionClass transaction_
   options.awaited_from = awaited_from;
   const auto answer = co_await node_.read(reg::mode, state_count, std::move(options));
   if (!answer) co_return failed(answer.error());
+  if (is_suspect(answer->registers, answer->answered_at)) co_return co_await read_again(transaction_class);
   co_return sample_of(answer->registers, answer->sent_at, answer->answered_at);
 }
 
 Task<Result<std::optional<DriveSample>>> YakoRtuDrive::watch_state(StateWatch watch) {
   modbus_rtu::Repetition repetition{.period = watch.period};
   repetition.goes_on = [this, &watch](const modbus_rtu::Reading& reading) {
+    if (is_suspect(reading.registers, reading.answered_at)) return false;
     return watch.goes_on(sample_of(reading.registers, reading.sent_at, reading.answered_at));
   };
   repetition.proof = {.request = node_.reading(reg::start_speed, canary_count),
@@ -166,6 +186,8 @@ Task<Result<std::optional<DriveSample>>> YakoRtuDrive::watch_state(StateWatch wa
   const auto answer = co_await node_.watch(reg::mode, state_count, std::move(repetition));
   if (!answer) co_return failed(answer.error());
   if (!*answer) co_return std::nullopt;
+  if (is_suspect((*answer)->registers, (*answer)->answered_at))
+    co_return co_await read_again(TransactionClass::idle_state);
   co_return sample_of((*answer)->registers, (*answer)->sent_at, (*answer)->answered_at);
 }
 

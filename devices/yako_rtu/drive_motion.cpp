@@ -31,6 +31,7 @@ void YakoRtuDrive::forget_power_cycle(const MotionBlock& block) {
   canary_.forget();
   proven_at_.reset();
   canary_.note_power_up(block);
+  torn_position_.forget();
   found_closed_.reset();
   unsaved_.clear();
 }
@@ -320,6 +321,7 @@ Task<Result<void>> YakoRtuDrive::clear_alarm(MotionGuard guard) {
 Task<Result<void>> YakoRtuDrive::clear_position(MotionGuard guard) {
   const auto written = co_await node_.write(
       reg::position_clear, 1, {.transaction_class = TransactionClass::motion, .guard = std::move(guard)});
+  torn_position_.forget();
   if (!written) co_return failed(written.error());
   co_return Result<void>{};
 }

@@ -59,6 +59,7 @@ void SimulatedDrive::power_up() {
   boot_end_ = now_ + settings_.boot_time;
   memory_.power_up();
   motor_.power_up();
+  position_high_read_.reset();
   const auto custom = memory_.get(reg::custom_node);
   const bool defined = custom >= model_->first_custom_address && custom <= model_->last_custom_address;
   const std::uint8_t fallback =
@@ -154,9 +155,14 @@ void SimulatedDrive::step(TimePoint now) {
   if (start_due_ <= now) start_now();
   if (clear_due_ <= now) {
     clear_due_ = TimePoint::max();
-    motor_.clear_counter();
+    clear_counter();
   }
   update_multi_speed();
+}
+
+void SimulatedDrive::clear_counter() {
+  motor_.clear_counter();
+  position_high_read_.reset();  // no carry
 }
 
 /// What the load and the encoder do meanwhile.

@@ -8,6 +8,7 @@
 #include <optional>
 #include <span>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "devices/simulation/motor.hpp"
@@ -63,8 +64,15 @@ class SimulatedDrive final : public simulation::SimulatedRtuNode {
     Rates rates;
   };
 
+  /// Which way homing searches, and how often it has turned round.
+  struct Search {
+    int direction = 1;
+    int turns = 0;
+  };
+
   // simulator.cpp: power, time, state
   void step(TimePoint now);
+  void clear_counter();
   [[nodiscard]] TimePoint next_event() const;
   [[nodiscard]] bool ready() const { return powered_ && !boot_end_; }
   [[nodiscard]] bool enabled() const { return enabled_ && !terminals_.active(Input::motor_free); }
@@ -89,7 +97,9 @@ class SimulatedDrive final : public simulation::SimulatedRtuNode {
   void configuration_changed();
 
   // simulator_protocol.cpp: frames
-  Fail read(std::span<const std::uint8_t> frame, std::vector<std::uint8_t>& reply) const;
+  Fail read(std::span<const std::uint8_t> frame, std::vector<std::uint8_t>& reply);
+  /// The upper word of the position, for one reading.
+  std::uint16_t read_position_high();
   Fail write_one(std::span<const std::uint8_t> frame, std::vector<std::uint8_t>& reply);
   Fail write_many(std::span<const std::uint8_t> frame, std::vector<std::uint8_t>& reply);
   Fail execute(std::uint16_t address, std::uint16_t value);
@@ -163,11 +173,12 @@ class SimulatedDrive final : public simulation::SimulatedRtuNode {
   TimePoint segment_due_ = TimePoint::max();  ///< PT start, 5 ms after its edge
   TimePoint clear_due_ = TimePoint::max();    ///< 0x002C takes effect
   TimePoint homing_due_ = TimePoint::max();   ///< the next phase of homing begins
+  /// 0x000A as it was read last, and when.
+  std::optional<std::pair<std::uint16_t, TimePoint>> position_high_read_;
   int segment_ = 0;
 
   Phase phase_ = Phase::ending;
-  int homing_direction_ = 1;
-  int homing_turns_ = 0;
+  Search homing_;
 };
 
 }  // namespace axisd::yako_rtu

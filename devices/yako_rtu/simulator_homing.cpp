@@ -17,7 +17,7 @@ bool SimulatedDrive::homing_ends_forwards() const {
          model_->homing_mode_1_ends_forwards != behaviour_.homing_mode_1_other_approach;
 }
 
-int SimulatedDrive::approach_direction() const { return homing_ends_forwards() ? 1 : homing_direction_; }
+int SimulatedDrive::approach_direction() const { return homing_ends_forwards() ? 1 : homing_.direction; }
 
 void SimulatedDrive::homing_run(int direction, double rpm) {
   const double time = memory_.get(reg::homing_time);
@@ -42,15 +42,15 @@ void SimulatedDrive::begin_homing() {
   homing_due_ = TimePoint::max();
   in_position_ = stopping_ = false;
   if (!behaviour_.homed_stays_during_homing) homed_ = false;
-  homing_direction_ = memory_.get(reg::homing_mode) % 2 == 0 ? 1 : -1;
-  homing_turns_ = 0;
+  homing_.direction = memory_.get(reg::homing_mode) % 2 == 0 ? 1 : -1;
+  homing_.turns = 0;
   if (behaviour_.homing_accepts_active_switch && terminals_.active(homing_reference())) {
     phase_ = Phase::back_off;
     homing_run(-approach_direction(), memory_.get(reg::homing_search_speed));
     return;
   }
   phase_ = Phase::search;
-  homing_run(homing_direction_, memory_.get(reg::homing_speed));
+  homing_run(homing_.direction, memory_.get(reg::homing_speed));
 }
 
 void SimulatedDrive::homing_edge(const InputEdge& edge) {
@@ -73,7 +73,7 @@ void SimulatedDrive::homing_limits() {
   const int direction = motor_.direction();
   const auto ahead = direction > 0 ? Input::positive_limit : Input::negative_limit;
   if (!terminals_.active(ahead) || ahead == homing_reference()) return;
-  const bool goes_on = phase_ == Phase::back_off && homing_turns_ > 0 && behaviour_.homing_never_gives_up;
+  const bool goes_on = phase_ == Phase::back_off && homing_.turns > 0 && behaviour_.homing_never_gives_up;
   if (phase_ == Phase::search || goes_on) {
     phase_ = Phase::turn;
     motor_.brake();
@@ -96,22 +96,22 @@ void SimulatedDrive::homing_stopped() {
   homing_due_ = TimePoint::max();
   switch (phase_) {
     case Phase::turn:
-      if (++homing_turns_ > 1 && !behaviour_.homing_never_gives_up) {
+      if (++homing_.turns > 1 && !behaviour_.homing_never_gives_up) {
         finish();
         break;
       }
-      if (behaviour_.homing_same_edge && !homing_ends_forwards() && homing_turns_ % 2 == 1) {
+      if (behaviour_.homing_same_edge && !homing_ends_forwards() && homing_.turns % 2 == 1) {
         phase_ =
             Phase::back_off;  // through the switch, until it has been left on the side where the search began
-        homing_run(-homing_direction_, memory_.get(reg::homing_speed));
+        homing_run(-homing_.direction, memory_.get(reg::homing_speed));
         break;
       }
-      if (!behaviour_.homing_same_edge || homing_ends_forwards()) homing_direction_ = -homing_direction_;
+      if (!behaviour_.homing_same_edge || homing_ends_forwards()) homing_.direction = -homing_.direction;
       phase_ = Phase::search;
-      homing_run(homing_direction_, memory_.get(reg::homing_speed));
+      homing_run(homing_.direction, memory_.get(reg::homing_speed));
       break;
     case Phase::found:
-      if (homing_direction_ != approach_direction() &&
+      if (homing_.direction != approach_direction() &&
           (!terminals_.active(Input::home) || behaviour_.homing_mode_1_either_edge)) {
         approach();
         break;
@@ -125,7 +125,7 @@ void SimulatedDrive::homing_stopped() {
       approach();
       break;
     case Phase::compensate:
-      if (!behaviour_.zero_before_compensation) motor_.clear_counter();
+      if (!behaviour_.zero_before_compensation) clear_counter();
       homed_ = true;
       finish();
       break;
@@ -138,7 +138,7 @@ void SimulatedDrive::homing_stopped() {
 /// On the switch: the compensation 0x0035 (forwards) and 0x0036 (backwards) follows, then the origin is set.
 void SimulatedDrive::homing_reached() {
   phase_ = Phase::compensate;
-  motor_.clear_counter();
+  clear_counter();
   const auto offset = static_cast<std::int64_t>(memory_.get(reg::homing_positive_offset)) -
                       static_cast<std::int64_t>(memory_.get(reg::homing_negative_offset));
   if (offset == 0) {

@@ -1,4 +1,6 @@
 // Frames of the simulated drive, manual 6.2.
+#include <utility>
+
 #include "devices/simulation/crc.hpp"
 #include "devices/yako_rtu/simulator.hpp"
 
@@ -14,6 +16,9 @@ void append_word(std::vector<std::uint8_t>& frame, std::uint16_t value) {
   frame.push_back(static_cast<std::uint8_t>(value >> 8U));
   frame.push_back(static_cast<std::uint8_t>(value & 0xFFU));
 }
+
+/// Where it was read longer ago the carry was not in between.
+constexpr auto just_now = std::chrono::milliseconds(250);
 
 constexpr std::uint8_t read_registers = 0x03, write_register = 0x06, write_registers = 0x10;
 
@@ -51,12 +56,23 @@ std::optional<std::vector<std::uint8_t>> SimulatedDrive::on_frame(std::span<cons
   return reply;
 }
 
-Fail SimulatedDrive::read(std::span<const std::uint8_t> frame, std::vector<std::uint8_t>& reply) const {
+std::uint16_t SimulatedDrive::read_position_high() {
+  const auto high = static_cast<std::uint16_t>(peek(reg::position_high));
+  const auto before = std::exchange(position_high_read_, std::pair(high, now_));
+  const bool torn = behaviour_.position_words_torn && before && now_ - before->second <= just_now;
+  return torn ? before->first : high;
+}
+
+Fail SimulatedDrive::read(std::span<const std::uint8_t> frame, std::vector<std::uint8_t>& reply) {
   const auto first = word(frame, 2), count = word(frame, 4);
   const auto fail = memory_.check_read(first, count);
   if (fail != Fail::none) return fail;
   reply.push_back(static_cast<std::uint8_t>(2 * count));
-  for (std::uint16_t i = 0; i < count; ++i) append_word(reply, static_cast<std::uint16_t>(peek(first + i)));
+  for (std::uint16_t i = 0; i < count; ++i) {
+    const auto address = static_cast<std::uint16_t>(first + i);
+    append_word(reply, address == reg::position_high ? read_position_high()
+                                                     : static_cast<std::uint16_t>(peek(address)));
+  }
   return Fail::none;
 }
 
@@ -117,7 +133,7 @@ Fail SimulatedDrive::execute(std::uint16_t address, std::uint16_t value) {
       if (behaviour_.position_clear_late)
         clear_due_ = now_ + std::chrono::milliseconds(20);
       else
-        motor_.clear_counter();
+        clear_counter();
       return Fail::none;
     case reg::homing_start:
       return value == 1 ? start_homing() : Fail::none;

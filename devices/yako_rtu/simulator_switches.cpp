@@ -181,6 +181,10 @@ constexpr Entry entries[] = {
     {{"mode_stays", false,
       "0x0003 keeps the mode of the last start when homing, PT or PV has ended; off: it is 0 at rest"},
      &Behaviour::mode_stays},
+    {{"position_words_torn", false,
+      "where 0x000A has just changed, one reading still shows it as it was beside the new 0x000B; off: both "
+      "words are of one moment"},
+     &Behaviour::position_words_torn},
     {{"position_is_commanded", false,
       "0x000A counts the pulses sent to the motor; off: what the encoder saw"},
      &Behaviour::position_is_commanded, &is_closed_loop},

@@ -25,7 +25,7 @@ struct Behaviour {
       homing_mode_1_either_edge;
   bool other_input_functions, inputs_undefined_at_power_up, all_segments;
   bool commands_readable, overtravel_stop_saved, undefined_address_is_1;
-  bool mode_stays;
+  bool mode_stays, position_words_torn;
   bool position_is_commanded, released_position_frozen, loop_mode_from_power_up;
 };
 

@@ -144,5 +144,35 @@ TEST(SimulatorSwitches, AreDocumentedUniqueAndUnknownOnesRefused) {
   EXPECT_THROW(Bench{with_switch("position_is_commanded")}, std::invalid_argument) << "it has no encoder";
 }
 
+/// As one frame shows it.
+std::int32_t position_read(Bench& bench) {
+  Bytes frame{1, 3, 0, 0x0A, 0, 2};
+  simulation::append_frame_crc(frame);
+  const auto reply = bench.drive().on_frame(frame);
+  if (!reply || reply->size() != 9) throw std::runtime_error("no reply");
+  std::uint32_t position = 0;
+  for (std::size_t i = 3; i < 7; ++i) position = position << 8U | (*reply)[i];
+  return static_cast<std::int32_t>(position);
+}
+
+TEST(Position, ItsWordsAreOfTwoMomentsWhereTheyCarryOnlyIfTheSwitchSaysSo) {
+  for (const bool torn : {false, true}) {
+    Bench bench(with_switch("position_words_torn", torn));
+    EXPECT_EQ(0, position_read(bench));
+    bench.move(-3);
+    bench.wait(240ms);
+    ASSERT_EQ(-3, bench.position());
+    EXPECT_EQ(torn ? 0xFFFD : -3, position_read(bench));
+    EXPECT_EQ(-3, position_read(bench)) << "once";
+    bench.move(3);
+    bench.wait(1s);
+    EXPECT_EQ(0, position_read(bench)) << "that was long ago";
+    bench.move(-3);
+    bench.wait(240ms);
+    bench.write(reg::position_clear, 1);
+    EXPECT_EQ(0, position_read(bench)) << "no carry";
+  }
+}
+
 }  // namespace
 }  // namespace axisd::yako_rtu
