@@ -415,7 +415,7 @@ class Axis {
   // axis_power.cpp: sequences that move nothing
   void on_turned_by_power(const Error& cause);
   Task<> run_enable(ActivityPtr activity);
-  void end_enable(Activity& activity, EnableMachine::State state);
+  void end_enable(Activity& activity, EnableMachine::State state, std::optional<Error> unanswered);
   Task<> run_disable(ActivityPtr activity);
   Task<> run_reset(ActivityPtr activity);
   Task<> run_set_position(ActivityPtr activity);

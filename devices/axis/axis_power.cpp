@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <memory>
+#include <optional>
 #include <utility>
 
 #include "devices/axis/axis.hpp"
@@ -59,10 +60,11 @@ Task<> Axis::run_enable(ActivityPtr activity) {
     else
       enable.silent();
   }
-  end_enable(*activity, enable.state());
+  end_enable(*activity, enable.state(), uncertain ? std::optional(result.error()) : std::nullopt);
 }
 
-void Axis::end_enable(Activity& activity, EnableMachine::State state) {
+/// `unanswered`: what became of its frame, where that got no reply.
+void Axis::end_enable(Activity& activity, EnableMachine::State state, std::optional<Error> unanswered) {
   if (state == EnableMachine::State::turned)
     return on_turned_by_power(error(Reason::terminal, "the drive moved when it was enabled",
                                     "check terminals that start motion; then reset the axis"));
@@ -70,10 +72,15 @@ void Axis::end_enable(Activity& activity, EnableMachine::State state) {
     power_.enabled();
     return finish(activity, [](CommandRecord& command) { command.done(); });
   }
-  finish(activity, [&](CommandRecord& command) {
-    command.error(error(Reason::not_confirmed, "the drive does not report its power stage as on",
-                        "check terminals with the function motor_free, and alarms"));
-  });
+  auto cause = error(Reason::not_confirmed, "the drive does not report its power stage as on",
+                     "check terminals with the function motor_free, and alarms");
+  if (unanswered) {
+    unanswered->message = cause.message + ", and the frame that enables it got no reply";
+    unanswered->remedy = "enable it again; if that is of no use: " + unanswered->remedy;
+    if (!terminals_.has("motor_free")) unanswered->outcome = Outcome::not_executed;
+    cause = *std::move(unanswered);
+  }
+  finish(activity, [&](CommandRecord& command) { command.error(std::move(cause)); });
 }
 
 Task<> Axis::run_disable(ActivityPtr activity) {

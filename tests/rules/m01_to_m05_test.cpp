@@ -71,6 +71,22 @@ TEST(M01, ShowsTheDrivesOwnEnableBit) {
   EXPECT_EQ(released.try_submit(MoveRelativeRequest{.distance = 1}).error().reason, Reason::disabled);
 }
 
+/// It says that the frame was lost, and not that a terminal holds the motor.
+TEST(M01, AnEnableWhoseFrameWasLostSaysSo) {
+  Rig rig({.switches = {{"enabled_at_power_up", false}}});
+  rig.fault({.kind = simulation::FaultKind::drop_request, .function = 0x06, .register_address = 0x0029});
+  const auto lost = rig.complete(EnableRequest{});
+  EXPECT_EQ(lost.state, CommandState::error);
+  ASSERT_TRUE(lost.cause);
+  EXPECT_EQ(lost.cause->reason, Reason::no_reply) << describe(lost);
+  EXPECT_EQ(lost.cause->outcome, Outcome::not_executed);
+  EXPECT_NE(lost.cause->message.find("got no reply"), std::string::npos) << lost.cause->message;
+  EXPECT_EQ(lost.cause->remedy.find("motor_free"), std::string::npos) << lost.cause->remedy;
+  EXPECT_EQ(rig.state()->state, AxisState::disabled);
+  EXPECT_EQ(rig.writes_of(0x0029), 1) << "it is not sent again by itself";
+  rig.enable();
+}
+
 TEST(M01, EnableThatMovesIsStopped) {
   Rig rig({.switches = {{"enabled_at_power_up", false}}});
   const auto enable = rig.submit(EnableRequest{});
