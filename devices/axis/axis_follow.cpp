@@ -284,10 +284,25 @@ void Axis::end_at_rest(Activity& activity) {
   if (terminal)
     return abort_at_rest(activity, error(Reason::terminal, "a stop terminal of the drive ended the motion",
                                          "check the terminals"));
-  fail_with_stop(activity, error(Reason::not_reached,
-                                 fmt::format("the drive came to rest at {:.6g} {}", tracker_.position(),
-                                             settings_.scale.unit),
-                                 "check terminals, and other masters on the bus"));
+  const auto& target = activity.plan.target;
+  const auto short_of = target ? std::abs(tracker_.counter() - target->counter) : std::int64_t{0};
+  auto cause =
+      error(Reason::not_reached,
+            fmt::format("the drive came to rest at {:.6g} {}", tracker_.position(), settings_.scale.unit),
+            "check terminals, and other masters on the bus");
+  // The loop gives an alarm where it is further off; what ended the motion on its way is mostly further, too.
+  if (drive_->closed_loop() && target && short_of < settings_.scale.pulses_per_revolution) {
+    cause.message +=
+        fmt::format(", {:.3g} {} from its target",
+                    static_cast<double>(short_of) / std::abs(scale_.pulses_per_unit()), settings_.scale.unit);
+    cause.remedy =
+        fmt::format(
+            "check what holds or loads the shaft, the drive's current, and its tuning if the shaft takes "
+            "longer than {} ms to settle; a larger position_tolerance permits more; else ",
+            settling() / milliseconds(1)) +
+        cause.remedy;
+  }
+  fail_with_stop(activity, std::move(cause));
 }
 
 }  // namespace axisd

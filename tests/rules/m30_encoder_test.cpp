@@ -105,7 +105,35 @@ TEST(M30, WhatDoesNotArriveIsNotDone) {
     EXPECT_EQ(move->value().state, CommandState::error) << describe(move->value());
     ASSERT_TRUE(move->value().cause);
     EXPECT_EQ(move->value().cause->reason, Reason::not_reached);
+    EXPECT_EQ(move->value().cause->remedy, "check terminals, and other masters on the bus");
   });
+}
+
+/// A hand, or the load, keeps the shaft from the target: neither a terminal nor another master does.
+TEST(M30, AShaftThatIsHeldOffItsTargetIsCalledThat) {
+  constexpr int counts = 40;  // of 2.5 um
+  for (const auto model : closed_loops) {
+    auto options = measured(model, 0);
+    options.adjust_drive = [usual = options.adjust_drive](simulation::SimulatedNodeSettings& node) {
+      usual(node);
+      node.encoder.compliance = counts;
+    };
+    both_directions(options, [](const RigOptions& each) {
+      Rig rig(each);
+      rig.ready();
+      const auto move = rig.submit(MoveAbsoluteRequest{.position = 50});
+      rig.run(300ms);
+      ASSERT_TRUE(rig.drive->lean_on_shaft(counts));
+      ASSERT_TRUE(rig.run_until([&] { return move->has_ended(); }, 10s));
+      EXPECT_EQ(move->value().state, CommandState::error) << describe(move->value());
+      ASSERT_TRUE(move->value().cause);
+      EXPECT_EQ(move->value().cause->reason, Reason::not_reached);
+      EXPECT_NE(move->value().cause->message.find(", 0.1 mm from its target"), std::string::npos)
+          << move->value().cause->message;
+      for (const auto* word : {"holds or loads", "current", "settle", "position_tolerance"})
+        EXPECT_NE(move->value().cause->remedy.find(word), std::string::npos) << word;
+    });
+  }
 }
 
 TEST(M30, MovesSmallerThanTheWindowAreMade) {
