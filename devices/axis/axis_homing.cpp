@@ -186,11 +186,11 @@ Error Axis::not_homed(HomingMachine::State state) const {
                    "check enable, alarm and terminals");
     case HomingMachine::State::too_far:
       return error(Reason::not_reached,
-                   fmt::format("no switch within max_travel of {} {}; stopped",
+                   fmt::format("no switch within max_travel of {} {}; it is being stopped",
                                settings_.homing->max_travel.value_or(0), settings_.scale.unit),
                    "check the switch and the homing direction");
     case HomingMachine::State::took_too_long:
-      return error(Reason::took_too_long, "no switch was found in time; stopped",
+      return error(Reason::took_too_long, "no switch was found in time; it is being stopped",
                    "check the switch, or raise homing: { timeout: ... }");
     default:
       return error(Reason::not_reached, "homing ended without reaching home",

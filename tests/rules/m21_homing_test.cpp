@@ -164,6 +164,8 @@ TEST(M21, ASwitchThatIsNeverFoundEndsInTime) {
                       const auto home = rig.complete(HomeRequest{});
                       EXPECT_EQ(home.state, CommandState::error);
                       EXPECT_EQ(home.cause->reason, travel ? Reason::not_reached : Reason::took_too_long);
+                      EXPECT_NE(home.cause->message.find("; it is being stopped"), std::string::npos)
+                          << "it turns as this is told: " << home.cause->message;
                       rig.run(3s);
                       EXPECT_FALSE(rig.drive->shaft_moving());
                       EXPECT_EQ(rig.state()->trust, PositionTrust::unknown);
