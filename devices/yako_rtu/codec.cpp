@@ -73,4 +73,16 @@ const char* exception_text(std::uint32_t code) {
   return texts.at(code < texts.size() ? code : 0);
 }
 
+const char* exception_remedy(std::uint32_t code) {
+  static constexpr auto remedies = std::to_array<const char*>(
+      {"see the drive's manual; check that the configured model is that of the drive",
+       "repeat it; if that happens often, check termination, shielding and baud rate",
+       "check that the configured model is that of the drive",
+       "check that the configured model is that of the drive",
+       "check that the configured model is that of the drive", "read fewer registers at once",
+       "check the drive's state (alarm, power, motion), and repeat it; some registers are only read",
+       "compare the value with the range in the drive's manual; firmware may differ from it"});
+  return remedies.at(code < remedies.size() ? code : 0);
+}
+
 }  // namespace axisd::yako_rtu

@@ -30,5 +30,7 @@ HomingBlock encode(const HomingProfile& profile);
 std::int64_t target_of(const MotionBlock& block);
 /// The vendor's exception codes (6.2.4), which are not those of the Modbus standard.
 const char* exception_text(std::uint32_t code);
+/// What to do about it.
+const char* exception_remedy(std::uint32_t code);
 
 }  // namespace axisd::yako_rtu

@@ -52,9 +52,11 @@ YakoRtuDrive::YakoRtuDrive(const Model& model, DriveContext context)
 }
 
 std::unexpected<Error> YakoRtuDrive::failed(Error error) const {
-  if (error.reason == Reason::refused && error.where.native_code)
-    error.message = fmt::format("the drive refused: {} (exception {:02})",
-                                exception_text(*error.where.native_code), *error.where.native_code);
+  if (error.reason == Reason::refused && error.where.native_code) {
+    const auto code = *error.where.native_code;
+    error.message = fmt::format("the drive refused: {} (exception {:02})", exception_text(code), code);
+    if (error.remedy.empty()) error.remedy = exception_remedy(code);
+  }
   return fail(std::move(error));
 }
 

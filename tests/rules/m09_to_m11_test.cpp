@@ -226,6 +226,7 @@ TEST(M10, EveryRefusedStartEnds) {
     rig.write_behind(0x0029, 0);
     const auto move = rig.complete(MoveAbsoluteRequest{.position = 30});
     EXPECT_TRUE(move.state == CommandState::error || move.state == CommandState::aborted) << describe(move);
+    EXPECT_FALSE(move.cause->remedy.empty()) << describe(move);
     rig.run(2s);
     EXPECT_EQ(rig.state()->state, AxisState::disabled);
     EXPECT_EQ(rig.drive->starts(), 0);

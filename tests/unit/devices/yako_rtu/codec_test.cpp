@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <string>
 #include <vector>
 
 namespace axisd::yako_rtu {
@@ -83,6 +84,13 @@ TEST(Codec, HomingOffsetsHaveARegisterForEachDirection) {
   const auto backwards = encode(HomingProfile{.offset_pulses = -9});
   EXPECT_EQ(backwards[4], 0);
   EXPECT_EQ(backwards[5], 9);
+}
+
+TEST(Codec, EachExceptionComesWithARemedy) {
+  for (std::uint32_t code = 0; code <= 9; ++code) EXPECT_STRNE(exception_remedy(code), "") << code;
+  EXPECT_STREQ(exception_remedy(8), exception_remedy(0)) << "none that the manual has";
+  EXPECT_NE(std::string(exception_remedy(7)).find("range"), std::string::npos);
+  EXPECT_NE(std::string(exception_remedy(1)).find("shielding"), std::string::npos) << "CRC";
 }
 
 }  // namespace
