@@ -4,7 +4,18 @@
 
 namespace axisd::modbus_rtu {
 
+namespace {
+
+/// So long a node is said to answer late.
+constexpr auto remembered = std::chrono::minutes(1);
+
+}  // namespace
+
 void LateReplies::note(const Request& request, const ExchangeResult& result, TimePoint now) {
+  if (unanswered_ && result.foreign_frames > 0) heard_late_[*unanswered_] = now;
+  const bool sent = result.status != ExchangeStatus::not_sent && result.status != ExchangeStatus::unsupported;
+  const bool in_vain = result.status == ExchangeStatus::timeout || result.status == ExchangeStatus::cut;
+  if (sent) unanswered_ = in_vain ? std::optional(request.node) : std::nullopt;
   const bool read = request.function == Function::read_holding_registers;
   switch (result.status) {
     case ExchangeStatus::replied:
@@ -28,6 +39,11 @@ void LateReplies::note(const Request& request, const ExchangeResult& result, Tim
     default:
       break;
   }
+}
+
+bool LateReplies::answers_late(std::uint8_t node, TimePoint now) const {
+  const auto* heard = heard_late_.find(node);
+  return heard != nullptr && now - *heard <= remembered;
 }
 
 void LateReplies::expect(const Request& request, TimePoint now) {

@@ -26,6 +26,10 @@ class LateReplies {
   /// that of any read before: its own may still come then.
   void note(const Request& request, const ExchangeResult& result, TimePoint now);
 
+  /// Within the last minute a frame was heard right after this node had left a request unanswered: most
+  /// likely it answers, and later than it is waited for.
+  [[nodiscard]] bool answers_late(std::uint8_t node, TimePoint now) const;
+
   /// A late reply would be taken for the one to this read.
   [[nodiscard]] bool may_answer(const Request& read, TimePoint now) const;
   /// The echo of this write may be that of an earlier one.
@@ -51,7 +55,9 @@ class LateReplies {
   /// Lengths of reads that timed out, by node, and until when their replies may still come.
   std::map<std::uint8_t, std::map<std::uint16_t, TimePoint>> reads_;
   std::map<std::uint8_t, std::map<Write, TimePoint>> echoes_;
-  NodeTable<Block> answered_;  ///< the longest read that each node has answered
+  NodeTable<Block> answered_;               ///< the longest read that each node has answered
+  std::optional<std::uint8_t> unanswered_;  ///< the node of the last exchange, where it was in vain
+  NodeTable<TimePoint> heard_late_;
 };
 
 }  // namespace axisd::modbus_rtu

@@ -30,6 +30,18 @@ Error not_sent_error(Verdict verdict) {
   }
 }
 
+Error late_error(Duration turnaround_max) {
+  return {
+      .reason = Reason::no_reply,
+      .message = fmt::format("no reply in time, but a frame later than turnaround_max ({} ms): most likely "
+                             "the node answers late",
+                             turnaround_max / std::chrono::milliseconds(1)),
+      .remedy =
+          "raise turnaround_max, of the axis or of its line, to what the node needs; else check power, "
+          "wiring, address and baud rate of the node",
+      .outcome = Outcome::unknown};
+}
+
 Error garbled_error(int in_a_row) {
   Error error{.reason = Reason::no_reply,
               .message = "only damaged bytes came back",
@@ -105,6 +117,8 @@ Error RtuBus::error_of(const Exchange& exchange, const ExchangeResult& result) c
     }
     case ExchangeStatus::timeout:
     case ExchangeStatus::cut:
+      if (late_.answers_late(exchange.request.node, clock_->now()))
+        return late_error(turnaround_max(exchange.request.node));
       return {.reason = Reason::no_reply,
               .message = "no reply",
               .remedy = "check power, wiring, address and baud rate of the node",

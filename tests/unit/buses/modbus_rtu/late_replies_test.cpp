@@ -83,5 +83,24 @@ TEST(LateReplies, TheEchoOfAWriteMayBeThatOfTheSameOneBefore) {
   EXPECT_FALSE(late.may_echo(stop, start + 6s));
 }
 
+TEST(LateReplies, AFrameAfterARequestInVainIsOfANodeThatAnswersLate) {
+  LateReplies late;
+  auto heard = answered();
+  heard.foreign_frames = 1;
+  late.note(read(0x0003, 10), heard, start);
+  EXPECT_FALSE(late.answers_late(1, start)) << "somebody else's: nothing was in vain";
+  late.note(read(0x0003, 10), lost, start);
+  late.note(read(0x0003, 1), answered(), start);
+  EXPECT_FALSE(late.answers_late(1, start)) << "nothing was heard";
+  late.note(read(0x0003, 10), lost, start);
+  Request other = read(0x0003, 2);
+  other.node = 2;
+  late.note(other, heard, start + 20ms);
+  EXPECT_TRUE(late.answers_late(1, start + 20ms));
+  EXPECT_FALSE(late.answers_late(2, start + 20ms));
+  EXPECT_TRUE(late.answers_late(1, start + 1min));
+  EXPECT_FALSE(late.answers_late(1, start + 2min));
+}
+
 }  // namespace
 }  // namespace axisd::modbus_rtu

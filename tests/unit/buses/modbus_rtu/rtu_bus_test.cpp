@@ -41,6 +41,27 @@ TEST(RtuBus, ALateReplyNeverAnswersAnotherRead) {
   }
 }
 
+/// It is not its wiring.
+TEST(RtuBus, ANodeThatAnswersTooLateIsToldFromASilentOne) {
+  for (const auto kind : {FaultKind::delay_reply, FaultKind::drop_request}) {
+    BusRig rig;
+    rig.line->network().faults().add({.kind = kind, .node = 1, .count = -1, .delay = 45ms});
+    rig.read("first", 0x0003, 10);
+    rig.read("second", 0x0020, 4);
+    rig.read("third", 0x0040, 6);
+    rig.world.run_for(5s);
+    ASSERT_EQ(rig.results.size(), 3U);
+    for (const auto& [name, result] : rig.results) {
+      ASSERT_FALSE(result) << name;
+      EXPECT_EQ(result.error().reason, Reason::no_reply) << to_string(result.error());
+    }
+    const auto& told = rig.results.at("third").error();
+    const bool late = kind == FaultKind::delay_reply;
+    EXPECT_EQ(told.message.find("turnaround_max (20 ms)") != std::string::npos, late) << to_string(told);
+    EXPECT_EQ(told.remedy.find("raise turnaround_max") != std::string::npos, late) << to_string(told);
+  }
+}
+
 /// For a start at a moment.
 TEST(RtuBus, WhatIsHeldLetsGoWhatStopsStartsOrMovesAndNothingElse) {
   BusRig rig;
