@@ -86,7 +86,8 @@ Action Client::sensible(const Station& station) {
   if (dice_.chance(0.06)) return DisableRequest{};
   if (dice_.chance(0.05)) return SetPositionRequest{.position = static_cast<double>(dice_.pick(40))};
   if (state->state == AxisState::error_stop && dice_.chance(0.8)) return ResetRequest{};
-  if (!state->enabled && dice_.chance(0.8)) return EnableRequest{};
+  // A restarted drive may be energised, and has to be enabled all the same (M1).
+  if (!(state->enabled && state->enabled_by_us) && dice_.chance(0.8)) return EnableRequest{};
   if (state->trust == PositionTrust::unknown && dice_.chance(0.6)) {
     if (dice_.chance(0.1)) return HomeRequest{};
     return SetPositionRequest{.position = static_cast<double>(dice_.pick(40))};

@@ -36,7 +36,7 @@ void Indexer::next(std::size_t index) {
 Action Indexer::action(const Station& station) {
   const auto state = station.axis->snapshot();
   if (state->state == AxisState::error_stop) return ResetRequest{};
-  if (!state->enabled) return EnableRequest{};
+  if (!(state->enabled && state->enabled_by_us)) return EnableRequest{};
   if (state->trust == PositionTrust::unknown || state->position < 0 || state->position > furthest)
     return SetPositionRequest{.position = middle};
   const double distance = (1 + dice_.pick(200)) / (state->position > middle ? -100.0 : 100.0);

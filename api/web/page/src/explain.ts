@@ -46,7 +46,7 @@ export function pageObstacle(axis: string): Obstacle | null {
 /** Whatever of a state the answers may depend on. */
 export function signature(state: AxisState): string {
   const bits = [...state.inputs, ...state.outputs].map(({ active }) => (active ? '1' : '0')).join('');
-  return [state.state, state.link, state.enabled, state.stopHeld, state.inhibited, state.trust, state.alarmCode, state.drift,
+  return [state.state, state.link, state.enabled, state.enabledByDaemon, state.stopHeld, state.inhibited, state.trust, state.alarmCode, state.drift,
           state.leaseHolder, state.fault?.reason ?? 0, state.holds.length, bits, state.moving,
           state.moving ? '' : state.position.toFixed(2)].join('|');
 }
