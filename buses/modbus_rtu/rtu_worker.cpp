@@ -126,14 +126,17 @@ void RtuWorker::run() {
   pthread_setname_np(pthread_self(), ("rtu:" + settings_.name).substr(0, longest_name).c_str());
   use_precise_waits();
   auto back_off = first_back_off;
+  auto closed_since = monotonic_now();
   while (!quitting()) {
     expect_port_call();
     auto port = open_port();
     touch();
-    if (port) back_off = first_back_off;
-    const auto error = port ? serve(std::move(*port)) : std::move(port.error());
+    const bool opened = port.has_value();
+    if (opened) back_off = first_back_off;
+    const auto error = port ? serve(std::move(*port), closed_since) : std::move(port.error());
     touch();
     if (quitting()) return;
+    if (opened) closed_since = monotonic_now();
     report(PortStatus{.open = false, .error = error});
     wait_closed(back_off, static_cast<int>(error.where.native_code.value_or(0)));
     back_off = std::min(2 * back_off, longest_back_off);
@@ -148,12 +151,11 @@ Result<SerialPort> RtuWorker::open_port() {
 }
 
 /// Serves the slot until the port is lost (the error says how) or the worker is to end.
-Error RtuWorker::serve(SerialPort port) {
+Error RtuWorker::serve(SerialPort port, TimePoint closed_since) {
   const auto path = port.path();
   WireSession session(std::move(port), settings_, wakeup_, progress_);
-  // One that was asked for just now goes out as soon as the core knows of the open port.
-  const auto began = monotonic_now();
-  int lost = session.find_echo([&] { return quitting() || stop_notice_->given() >= began; });
+  // One that was asked for while the port was closed goes out as soon as the core knows of the open port.
+  int lost = session.find_echo([&] { return quitting() || stop_notice_->given() >= closed_since; });
   const std::function<bool()> stop_waits = [this] {
     return quitting() || awaits_stop() || (stop_armed_.load() && armed());
   };

@@ -60,7 +60,7 @@ class RtuWorker final : public Line {
 
   void run();
   Result<SerialPort> open_port();
-  Error serve(SerialPort port);
+  Error serve(SerialPort port, TimePoint closed_since);
   void bind(WireSession& session, const Exchange& exchange, int& lost);
   bool prepare(WireSession& session, const Exchange& exchange, int& lost);
   [[nodiscard]] bool awaits_stop() const;

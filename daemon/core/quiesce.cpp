@@ -8,6 +8,7 @@
 #include "buses/canopen/canopen_bus.hpp"
 #include "buses/modbus_rtu/rtu_bus.hpp"
 #include "buses/signal.hpp"
+#include "devices/axis/motion_machine.hpp"
 #include "devices/axis/planner.hpp"
 #include "devices/descriptor.hpp"
 
@@ -51,6 +52,7 @@ Task<QuiesceReport> stop_one(Executor executor, Clock& clock, std::string axis, 
   QuiesceReport report{.axis = std::move(axis)};
   Rest rest(drive.position_window());
   report.detail = "the port did not open";
+  std::optional<TimePoint> first;  // stop that was acknowledged
   while (clock.now() < times.end) {
     if (!bus.port().open) {
       if (bus.port().error) report.detail = to_string(*bus.port().error);
@@ -61,13 +63,18 @@ Task<QuiesceReport> stop_one(Executor executor, Clock& clock, std::string axis, 
     const auto sent = co_await drive.stop(kind);
     const auto acked = clock.now();
     if (sent) {
+      first = first.value_or(acked);
       const auto state = co_await drive.read_state(TransactionClass::moving_state);
-      if (state && state->asked_at >= acked && rest.confirms(*state)) {
+      // What the daemon started right before it ended may begin yet, whatever was acknowledged (M13).
+      const bool may_begin = state && state->asked_at < *first + start_window;
+      if (state && state->asked_at >= acked && rest.confirms(*state) && !may_begin) {
         report.confirmed = true;
         report.detail = "standstill confirmed";
         co_return report;
       }
-      report.detail = state ? "still moving" : to_string(state.error());
+      report.detail = !state          ? to_string(state.error())
+                      : state->moving ? "still moving"
+                                      : "not at rest for long enough";
     } else {
       report.detail = to_string(sent.error());
     }

@@ -251,9 +251,9 @@ void Axis::end_motion(Activity& activity, MotionMachine::State state) {
       return fail_with_stop(activity, error(Reason::terminal, "a terminal of the drive took over the motion",
                                             "check the terminals"));
     case MotionMachine::State::astray:
-      return fail_with_stop(activity,
-                            error(Reason::not_reached, "the drive moves away from its target; stopped",
-                                  "look at the machine; check for other masters on the bus"));
+      return fail_with_stop(
+          activity, error(Reason::not_reached, "the drive moves away from its target, and is being stopped",
+                          "look at the machine; check load, tuning, and other masters on the bus"));
     case MotionMachine::State::did_not_start:
       return fail_with_stop(activity,
                             error(Reason::did_not_start, "the drive accepted the start but does not move",

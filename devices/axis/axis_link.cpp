@@ -144,8 +144,9 @@ Task<Result<void>> Axis::settle_found_motion() {
       found = "it was found moving, was stopped, and came to rest";
     }
     stop_.owe();
-    bool rests = false;
-    for (const auto kind : {StopKind::stop, StopKind::quick_stop}) {
+    bool rests = false, began = false;
+    for (auto kind = StopKind::stop;; kind = began ? kind : StopKind::quick_stop) {
+      const auto begun = unseen_start_.begun();
       const auto sent = co_await drive_->stop(kind);
       const bool may_have_come = sent || sent.error().outcome == Outcome::unknown;
       if (kind == StopKind::quick_stop && may_have_come && !drive_->closed_loop()) lose_trust();
@@ -153,10 +154,11 @@ Task<Result<void>> Axis::settle_found_motion() {
       const auto braking = std::max(stop_.deceleration(), braking_time(kind));
       const auto deadline = env_.clock->now() + braking + settings_.stop_margin;
       rests = co_await standstill_unpolled(deadline, false);
-      if (!rests && sample_->asked_at < deadline)  // silent: it begins anew, with a stop
+      began = unseen_start_.begun() != begun;  // once for each start: that stop may have been ignored
+      if (!rests && !began && sample_->asked_at < deadline)  // silent: it begins anew, with a stop
         co_return fail(error(Reason::no_reply, "the drive fell silent while it was being stopped",
                              "check power and wiring"));
-      if (rests || life_.ends()) break;
+      if (rests || life_.ends() || (kind == StopKind::quick_stop && !began)) break;
     }
     if (!rests) {
       if (settings_.stop_escalation_release && !life_.ends()) co_await drive_->disable({});
@@ -183,6 +185,7 @@ Task<Result<void>> Axis::prove_or_configure() {
     if (!proof && proof.error().reason != Reason::rebooted) co_return proof;
     if (!proof && link_.is_configured()) on_reboot(proof.error());
     if (!proof && restorable) void_saved_position();
+    if (!proof) power_.restarted();  // also where an earlier run of the daemon knew it (M1)
     if (!proof) restorable.reset();
     if (life_.ends()) co_return fail(ending());
   }

@@ -177,7 +177,6 @@ Task<bool> Axis::positioned(ActivityPtr activity) {
     there = result && tracker_.rests_at(target);
     if (result && !there) {
       activity->plan.predicted = planner_.duration(activity->plan, target.counter - base);
-      activity->number = unseen_start_.sending(base);
       if (may_move_by_itself()) {
         auto triggered = co_await start_unmoved(activity);
         if (!triggered) {
@@ -187,6 +186,7 @@ Task<bool> Axis::positioned(ActivityPtr activity) {
         result = *std::move(triggered);
         base = tracker_.counter();
       } else {
+        activity->number = unseen_start_.sending(base, env_.clock->now());
         result = co_await drive_->start_move(profile_of(activity->plan), guard(*activity));
       }
       if (result || result.error().outcome == Outcome::unknown) tracker_.forget_base();
@@ -254,7 +254,7 @@ Task<> Axis::run_velocity(ActivityPtr activity) {
     if (!current(*activity) || !may_start(*activity)) co_return;
     base = tracker_.counter();
     if (result) {
-      activity->number = unseen_start_.sending(base);
+      activity->number = unseen_start_.sending(base, env_.clock->now());
       result = co_await drive_->start_velocity(profile, guard(*activity));
     }
   }

@@ -42,6 +42,10 @@ std::vector<Error> Axis::check_exchange(bool energised) const {
         link_.online()
             ? "disable it first: " + shell("disable")
             : "look at the machine and let the drive answer; or restart the service with this configuration");
+  // The one that comes after would take it for energised since ever (M1).
+  if (power_.state() == PowerMachine::State::restarted && sample_ && sample_->enabled)
+    add(Reason::busy, "its drive was switched off and on, and is energised",
+        "enable or disable it first: " + shell("enable"));
   if (fault_)  // whoever comes after would know nothing of it
     add(Reason::fault, "in ErrorStop: " + fault_->message, "reset it first: " + shell("reset"));
   return found;

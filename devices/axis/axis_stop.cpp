@@ -237,9 +237,10 @@ Task<bool> Axis::standstill_unpolled(TimePoint deadline, bool of_stop) {
   const auto another = [&] { return of_stop && stop_.overtaken(); };
   UnpolledStandstill watch(deadline);
   for (;;) {
+    const auto begun = unseen_start_.begun();
     const auto sample = co_await drive_->read_state(TransactionClass::moving_state);
     if (sample) on_sample(*sample);
-    if (another()) co_return false;
+    if (another() || unseen_start_.begun() != begun) co_return false;
     auto found = RestVerdict::undecided;
     if (!sample)
       found = watch.silence();

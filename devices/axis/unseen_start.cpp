@@ -4,7 +4,8 @@
 
 namespace axisd {
 
-int UnseenStart::sending(std::int64_t base) {
+int UnseenStart::sending(std::int64_t base, TimePoint now) {
+  since_ = now;
   state_ = State::sending;
   base_ = base;
   return ++starts_;
@@ -27,9 +28,10 @@ void UnseenStart::wait_from(TimePoint now) {
 }
 
 bool UnseenStart::look(const Reading& reading) {
-  if (state_ == State::none) return false;
+  if (state_ == State::none || reading.asked_at < since_) return false;
   const bool over = state_ == State::unseen && reading.asked_at >= until_;
   if (reading.moving || reading.elsewhere || over) state_ = State::none;
+  if (reading.moving) ++begun_;
   return reading.moving;
 }
 

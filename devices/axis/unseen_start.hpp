@@ -29,9 +29,9 @@ class UnseenStart {
     bool elsewhere = false;  ///< than at base()
   };
 
-  /// From now on a start may be sent; the shaft is at `base`. Returns what names it to sent() and not_sent(),
-  /// which do nothing for one that is not the newest.
-  int sending(std::int64_t base);
+  /// From `now` on a start may be sent; the shaft is at `base`. Returns what names it to sent() and
+  /// not_sent(), which do nothing for one that is not the newest.
+  int sending(std::int64_t base, TimePoint now);
   /// What became of it is told at `now`: it was sent, or nobody knows.
   void sent(int start, TimePoint now);
   /// It is known that it was not.
@@ -40,19 +40,24 @@ class UnseenStart {
   void left(TimePoint now);
   /// The drive has forgotten it.
   void restarted() { state_ = State::none; }
-  /// True: the motion has just been seen under way for the first time.
+  /// True: the motion has just been seen under way for the first time. What was asked for before sending()
+  /// says nothing.
   [[nodiscard]] bool look(const Reading& reading);
 
   [[nodiscard]] State state() const { return state_; }
   /// A drive at rest may begin yet.
   [[nodiscard]] bool may_begin() const { return state_ != State::none; }
   [[nodiscard]] std::int64_t base() const { return base_; }
+  /// How many were seen to begin.
+  [[nodiscard]] int begun() const { return begun_; }
 
  private:
   void wait_from(TimePoint now);
 
   State state_ = State::none;
   int starts_ = 0;
+  int begun_ = 0;
+  TimePoint since_{};
   std::int64_t base_ = 0;  ///< pulses
   TimePoint until_{};
 };

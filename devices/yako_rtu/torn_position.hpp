@@ -16,8 +16,8 @@ class TornPosition {
   /// Pulses per second, the most that the drive can do; > 0.
   explicit TornPosition(double highest_rate) : highest_rate_(highest_rate) {}
 
-  /// This reading is 65536 away from where the shaft can be after the one that was believed last. False also
-  /// where that was too long ago to say so.
+  /// This reading is 65536 away from where the shaft can be after the one that was believed last, or from
+  /// where it was then, however long ago; without one, from 0.
   [[nodiscard]] bool suspects(std::int32_t position, TimePoint measured_at) const;
   /// It was asked for at `asked_at`, and is taken for true.
   void believe(std::int32_t position, TimePoint asked_at);

@@ -38,6 +38,22 @@ TEST(M01, ARestartedDriveStartsNothingUntilItIsEnabled) {
   });
 }
 
+/// The axis that comes after it would know nothing of the restart.
+TEST(M01, ARestartedDriveIsNotGivenToAnotherAxisBeforeItIsEnabled) {
+  Rig rig;
+  rig.ready();
+  EXPECT_TRUE(rig.axis().check_exchange(true).empty());
+  rig.cycle_power(10ms);
+  ASSERT_TRUE(rig.run_until([&] { return rig.state()->reboots == 1; }, 5s));
+  rig.reconnect();
+  ASSERT_TRUE(rig.state()->enabled);
+  const auto refused = rig.axis().check_exchange(true);
+  ASSERT_EQ(refused.size(), 1U);
+  EXPECT_THAT(refused[0].message, HasSubstr("switched off and on"));
+  rig.enable();
+  EXPECT_TRUE(rig.axis().check_exchange(true).empty());
+}
+
 /// Nobody knows of a restart: it may have been energised, and at work, all the time.
 TEST(M01, ADriveThatIsFoundEnergisedMayMove) {
   Rig rig;

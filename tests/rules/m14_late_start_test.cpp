@@ -54,6 +54,30 @@ TEST(M9, AMotionThatIsReplacedBeforeItBeginsIsNotExecutedInItsPlace) {
   }
 }
 
+/// The stop that is owed is the first that the drive gets then; but it had not begun yet.
+TEST(M4, AMotionThatBeginsUnderTheStopOfAReconnectIsStoppedAgain) {
+  Rig rig(starts_late);
+  rig.ready();
+  const auto move = rig.submit(MoveAbsoluteRequest{.position = 300, .with = {.velocity = 50}});
+  ASSERT_TRUE(rig.run_until([&] { return move->value().state == CommandState::active; }, 1s));
+  rig.line->forget_wire();
+  rig.line->set_open(false);
+  rig.run(5ms);
+  rig.line->set_open(true);
+  rig.reconnect();
+  EXPECT_FALSE(rig.drive->shaft_moving());
+  const auto where = rig.drive->shaft_pulses();
+  rig.run(2s);
+  EXPECT_EQ(rig.drive->shaft_pulses(), where);
+  int stops = 0;
+  for (const auto& entry : rig.line->wire())
+    if (entry.is_write() && entry.address() == 0x0028) {
+      EXPECT_EQ(entry.value(), 0) << "no quick stop: it would cost the position";
+      ++stops;
+    }
+  EXPECT_GE(stops, 2);
+}
+
 TEST(M10, AMotionThatGoesTheWrongWayIsStopped) {
   Rig rig;
   rig.ready();

@@ -12,7 +12,7 @@ constexpr TimePoint sent{10s};
 constexpr auto window_end = sent + 500ms;
 
 struct Start {
-  Start() { number = start.sending(100); }
+  Start() { number = start.sending(100, sent); }
   bool look(TimePoint asked_at, bool moving = false, bool elsewhere = false) {
     return start.look({.asked_at = asked_at, .moving = moving, .elsewhere = elsewhere});
   }
@@ -60,6 +60,15 @@ TEST(UnseenStart, AMotionMayShowBeforeItsReplyDoes) {
   EXPECT_FALSE(a.start.may_begin());
 }
 
+TEST(UnseenStart, WhatWasReadBeforeItsTriggerSaysNothingOfIt) {
+  Start a;
+  EXPECT_FALSE(a.look(sent - 1ms, true, true));
+  EXPECT_TRUE(a.start.may_begin());
+  EXPECT_EQ(a.start.begun(), 0);
+  EXPECT_TRUE(a.look(sent, true));
+  EXPECT_EQ(a.start.begun(), 1);
+}
+
 TEST(UnseenStart, WhoRestsElsewhereHasBegunAndEnded) {
   Start a;
   a.start.sent(a.number, sent);
@@ -85,7 +94,7 @@ TEST(UnseenStart, ALateAnswerDoesNotPutItOff) {
 
 TEST(UnseenStart, WhatBecameOfOneBeforeSaysNothingOfTheNewest) {
   Start a;
-  const auto newest = a.start.sending(200);
+  const auto newest = a.start.sending(200, sent);
   a.start.not_sent(a.number);
   a.start.sent(a.number, sent);
   EXPECT_EQ(a.start.state(), State::sending);

@@ -49,14 +49,20 @@ TEST(TornPosition, AnotherStepIsNoCarry) {
   EXPECT_FALSE(suspects(30'000, 0));
 }
 
-TEST(TornPosition, NothingIsKnownOfWhatWasNotReadJustBefore) {
-  EXPECT_FALSE(suspects(-1, 65'535, 1s)) << "it can have gone there";
+TEST(TornPosition, AtRestItIsSuspectHoweverLongAgoItWasRead) {
+  EXPECT_TRUE(suspects(-1, 65'535, 1s));
+  EXPECT_TRUE(suspects(2, words(0xFFFF, 0x0000), 1h));
+  EXPECT_FALSE(suspects(-1, 64'000, 1s)) << "it can have gone there, and no carry is near";
+  EXPECT_FALSE(suspects(-1, 2, 1s));
   TornPosition torn(highest_rate);
-  EXPECT_FALSE(torn.suspects(65'535, start));
+  EXPECT_TRUE(torn.suspects(65'535, start)) << "nothing was read before: it may be 0";
+  EXPECT_FALSE(torn.suspects(1, start));
+  EXPECT_FALSE(torn.suspects(100'000, start));
   torn.believe(-1, start);
   EXPECT_TRUE(torn.suspects(65'535, start + 20ms));
+  torn.believe(70'000, start);
   torn.forget();
-  EXPECT_FALSE(torn.suspects(65'535, start + 20ms));
+  EXPECT_FALSE(torn.suspects(4'464, start + 20ms));
 }
 
 }  // namespace
