@@ -208,8 +208,9 @@ TEST(M15, AStopThatIsNotCertainWaitsForNoAwaitedReading) {
     if (of_stop.size() < 4) continue;  // a reading of its state came between
     ++uncertain;
     ASSERT_EQ(wire[of_stop[2]].address(), moving);
-    // One may have been under way as the stop was heard; or have its turn by the reservation.
-    EXPECT_LE(of_stop[2] - of_stop[1], 2U) << round;
+    // One may have been under way as the stop was heard, one have its turn by the reservation, and one be the
+    // next frame of a start that waited before it.
+    EXPECT_LE(of_stop[2] - of_stop[1], 4U) << round;
     EXPECT_LE(of_stop[3] - of_stop[2], 2U) << round;
   }
   EXPECT_GT(uncertain, 50);
@@ -217,7 +218,7 @@ TEST(M15, AStopThatIsNotCertainWaitsForNoAwaitedReading) {
 }
 
 /// What a client reads of a drive is not ended by its starts.
-TEST(M32, ParametersAreReadThoughTheAxisIndexes) {
+TEST(M32Reading, ParametersAreReadThoughTheAxisIndexes) {
   ComparedAxes compared(4);
   auto& line = compared.line;
   core::DriveAccessService drives(line.world.executor(), line.world.clock(), line.machine());
