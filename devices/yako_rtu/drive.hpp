@@ -96,7 +96,7 @@ class YakoRtuDrive final : public Drive {
   DriveSample sample_of(std::span<const std::uint16_t> registers, TimePoint asked_at, TimePoint measured_at);
   /// The words of its position may be of two moments: it is read again, and the second is believed.
   [[nodiscard]] bool is_suspect(std::span<const std::uint16_t> registers, TimePoint measured_at) const;
-  Task<Result<DriveSample>> read_again(TransactionClass transaction_class);
+  Task<Result<DriveSample>> read_again(TransactionClass transaction_class, std::int32_t suspect);
   /// Reads what note_register() keeps: how far from its target the drive takes itself for in position, and
   /// what a start in one frame writes back.
   Task<Result<void>> read_noted();

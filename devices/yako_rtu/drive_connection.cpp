@@ -156,9 +156,14 @@ bool YakoRtuDrive::is_suspect(std::span<const std::uint16_t> registers, TimePoin
   return torn_position_.suspects(decode_state(registers).position_pulses, measured_at);
 }
 
-Task<Result<DriveSample>> YakoRtuDrive::read_again(TransactionClass transaction_class) {
-  const auto answer = co_await node_.read(reg::mode, state_count, in(transaction_class));
+Task<Result<DriveSample>> YakoRtuDrive::read_again(TransactionClass transaction_class, std::int32_t suspect) {
+  auto answer = co_await node_.read(reg::mode, state_count, in(transaction_class));
   if (!answer) co_return failed(answer.error());
+  auto& registers = answer->registers;
+  const auto position =
+      static_cast<std::uint32_t>(TornPosition::of_two(suspect, decode_state(registers).position_pulses));
+  registers.at(reg::position_high - reg::mode) = static_cast<std::uint16_t>(position >> 16U);
+  registers.at(reg::position_low - reg::mode) = static_cast<std::uint16_t>(position & 0xFFFFU);
   co_return sample_of(answer->registers, answer->sent_at, answer->answered_at);
 }
 
@@ -168,7 +173,8 @@ Task<Result<DriveSample>> YakoRtuDrive::read_state(TransactionClass transaction_
   options.awaited_from = awaited_from;
   const auto answer = co_await node_.read(reg::mode, state_count, std::move(options));
   if (!answer) co_return failed(answer.error());
-  if (is_suspect(answer->registers, answer->answered_at)) co_return co_await read_again(transaction_class);
+  if (is_suspect(answer->registers, answer->answered_at))
+    co_return co_await read_again(transaction_class, decode_state(answer->registers).position_pulses);
   co_return sample_of(answer->registers, answer->sent_at, answer->answered_at);
 }
 
@@ -189,7 +195,8 @@ Task<Result<std::optional<DriveSample>>> YakoRtuDrive::watch_state(StateWatch wa
   if (!answer) co_return failed(answer.error());
   if (!*answer) co_return std::nullopt;
   if (is_suspect((*answer)->registers, (*answer)->answered_at))
-    co_return co_await read_again(TransactionClass::idle_state);
+    co_return co_await read_again(TransactionClass::idle_state,
+                                  decode_state((*answer)->registers).position_pulses);
   co_return sample_of((*answer)->registers, (*answer)->sent_at, (*answer)->answered_at);
 }
 

@@ -36,4 +36,12 @@ void TornPosition::believe(std::int32_t position, TimePoint asked_at) {
   believed_ = {.position = position, .asked_at = asked_at};
 }
 
+std::int32_t TornPosition::of_two(std::int32_t suspect, std::int32_t second) {
+  const auto apart =
+      static_cast<std::int32_t>(static_cast<std::uint32_t>(second) - static_cast<std::uint32_t>(suspect));
+  constexpr std::uint32_t one = 0x10000;
+  if (std::abs(std::abs(static_cast<double>(apart)) - 2 * carry) > carry / 2) return second;
+  return static_cast<std::int32_t>(static_cast<std::uint32_t>(second) + (apart > 0 ? 0U - one : one));
+}
+
 }  // namespace axisd::yako_rtu

@@ -24,6 +24,10 @@ class TornPosition {
   /// The counter means something else now.
   void forget() { believed_.reset(); }
 
+  /// The position by a suspect reading and the one right after it. A shaft that wavers about a carry may tear
+  /// both, in one direction and in the other; else the second is right.
+  [[nodiscard]] static std::int32_t of_two(std::int32_t suspect, std::int32_t second);
+
  private:
   struct Believed {
     std::int32_t position = 0;

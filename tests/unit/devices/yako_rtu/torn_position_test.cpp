@@ -34,6 +34,16 @@ TEST(TornPosition, ACarryBetweenTheWordsIsSuspectInEitherDirection) {
   EXPECT_TRUE(suspects(std::numeric_limits<std::int32_t>::min(), words(0x7FFF, 0x0000)));
 }
 
+TEST(TornPosition, OfTwoReadingsTheSecondIsRightUnlessBothAreTorn) {
+  EXPECT_EQ(TornPosition::of_two(65'535, -1), -1);
+  EXPECT_EQ(TornPosition::of_two(-65'536, 3), 3);
+  EXPECT_EQ(TornPosition::of_two(0, 0), 0) << "it was cleared at 65536";
+  EXPECT_EQ(TornPosition::of_two(65'535, -65'536), 0) << "-1, and then 0";
+  EXPECT_EQ(TornPosition::of_two(-65'536, 65'535), -1);
+  EXPECT_EQ(TornPosition::of_two(words(0x8000, 0xFFFF), words(0x7FFF, 0x0000)),
+            std::numeric_limits<std::int32_t>::min());
+}
+
 TEST(TornPosition, WhatTheMotorCanDoIsNotSuspect) {
   for (const auto later : {1ms, 5ms, 20ms, 200ms}) {
     const auto way = static_cast<std::int32_t>(highest_rate * static_cast<double>(later / 1ms) / 1000);
