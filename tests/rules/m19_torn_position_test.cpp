@@ -19,8 +19,8 @@ RigOptions torn(std::string_view model) {
       .model = std::string(model), .switches = {{"position_words_torn", true}}, .limits = false};
   if (model == "ykd2405pr") return options;
   options.adjust = [](AxisSettings& axis) { axis.homing->method = HomingMethod::negative_limit; };
-  // 4000 counts per revolution: two pulses to either side, at rest as well.
-  options.adjust_drive = [](simulation::SimulatedNodeSettings& node) { node.encoder.noise = 8; };
+  // In pulses, which are coarser than its counts; at rest as well, and well within its window of 10.
+  options.adjust_drive = [](simulation::SimulatedNodeSettings& node) { node.encoder.noise = 3; };
   return options;
 }
 
