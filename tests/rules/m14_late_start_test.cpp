@@ -62,9 +62,12 @@ TEST(M4, AMotionThatBeginsUnderTheStopOfAReconnectIsStoppedAgain) {
   ASSERT_TRUE(rig.run_until([&] { return move->value().state == CommandState::active; }, 1s));
   rig.line->forget_wire();
   rig.line->set_open(false);
-  rig.run(5ms);
+  rig.run(1ms);
+  const auto stop = rig.submit(StopRequest{});
+  ASSERT_TRUE(rig.run_until([&] { return rig.state()->link == LinkState::offline; }, 30ms));
   rig.line->set_open(true);
   rig.reconnect();
+  EXPECT_EQ(stop->value().state, CommandState::unknown) << describe(stop->value());
   EXPECT_FALSE(rig.drive->shaft_moving());
   const auto where = rig.drive->shaft_pulses();
   rig.run(2s);
@@ -105,7 +108,7 @@ TEST(M13, WhileTheMotorTurnsStopsGoOutUntilOneIsAcknowledged) {
   rig.ready();
   rig.submit(MoveVelocityRequest{.velocity = 80});
   rig.run(1s);
-  for (int lost = 0; lost < 6; ++lost) rig.fault({.kind = FaultKind::drop_request, .function = 0x06});
+  rig.fault({.kind = FaultKind::drop_request, .function = 0x06, .count = 6});
   const auto asked = rig.world.now();
   const auto stop = rig.submit(StopRequest{});
   ASSERT_TRUE(rig.run_until([&] { return stop->has_ended(); }, 5s));
