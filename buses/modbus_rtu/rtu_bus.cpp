@@ -276,9 +276,9 @@ bool RtuBus::starts_can_wait(TimePoint now) const {
 }
 
 /// It is part of one axis's start, and its guard leaves time for what would go before it, and for another
-/// frame of its chain behind it: the former and one of these answered as late as may be (M6). What no gate
-/// guards is a reading: that of a start, which is over soon, that of a group (M22), or that of a stop, whose
-/// bound counts none before it. Members of a group start back to back.
+/// frame of its chain behind it, one of them answered as late as may be (M6). What no gate guards is a
+/// reading: that of a start, which is over soon, that of a group (M22), or that of a stop, whose bound counts
+/// none before it. Members of a group start back to back.
 bool RtuBus::can_wait(const Transaction& motion, TimePoint now) const {
   const auto& exchange = motion.exchange;
   if (!exchange.guard.gate || exchange.guard.with) return false;
@@ -288,8 +288,9 @@ bool RtuBus::can_wait(const Transaction& motion, TimePoint now) const {
   const auto wire =
       wire_time(line, longest_reading + exchange.frame.size() + reply_size(exchange.request) + size_of_write);
   const auto* const first = queue_.next_of(TransactionClass::moving_state);
-  const auto answered = first == nullptr ? Duration{} : first->exchange.turnaround_max + reply_margin;
-  return now + wire + 6 * silence(line) + answered + turnaround_max(exchange.request.node) < until;
+  const auto latest = std::max(turnaround_max(exchange.request.node),
+                               first == nullptr ? Duration{} : first->exchange.turnaround_max);
+  return now + wire + 6 * silence(line) + latest < until;
 }
 
 void RtuBus::arm_next() {
