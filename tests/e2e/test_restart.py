@@ -242,7 +242,7 @@ class Damage(CrashScenario):
                 detail = self.refused(*reason, machine.client.motion, "MoveRelative", "feeder", request_id="once",
                                       distance=DISTANCE)
                 self.assertIn("damaged", detail.message)
-                self.assertIn("read the axis", detail.remedy)
+                self.assertIn("ask again in ", detail.remedy)
                 self.assertEqual(detail.outcome, error_pb.OUTCOME_UNKNOWN)
                 self.assertEqual(machine.axisctl("state", "accept").returncode, 0)
             self.assertIn("the command journal was damaged", machine.daemon.log())

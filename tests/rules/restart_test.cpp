@@ -334,7 +334,7 @@ TEST(Restart, DamageRefusesWhatItMayHaveLost) {
     ASSERT_FALSE(lost) << "it was executed";
     EXPECT_EQ(lost.error().reason, Reason::storage);
     EXPECT_EQ(lost.error().outcome, Outcome::unknown);
-    EXPECT_THAT(lost.error().remedy, HasSubstr("read the axis"));
+    EXPECT_THAT(lost.error().remedy, HasSubstr("ask again in "));
     EXPECT_EQ(repeat(rig, move, "r1").id, known.id) << "what is there is known";
     EXPECT_EQ(rig.complete(StopRequest{}).state, CommandState::done);
     if (restart == 0) rig.kill_daemon();
