@@ -19,6 +19,8 @@ void append_word(std::vector<std::uint8_t>& frame, std::uint16_t value) {
 
 /// Where it was read longer ago the carry was not in between.
 constexpr auto just_now = std::chrono::milliseconds(250);
+/// Nor where it was longer ago than a drive takes from one word to the next: pulses, of 200 kHz in 1 ms.
+constexpr int near_carry = 200;
 
 constexpr std::uint8_t read_registers = 0x03, write_register = 0x06, write_registers = 0x10;
 
@@ -59,7 +61,9 @@ std::optional<std::vector<std::uint8_t>> SimulatedDrive::on_frame(std::span<cons
 std::uint16_t SimulatedDrive::read_position_high() {
   const auto high = static_cast<std::uint16_t>(peek(reg::position_high));
   const auto before = std::exchange(position_high_read_, std::pair(high, now_));
-  const bool torn = behaviour_.position_words_torn && before && now_ - before->second <= just_now;
+  const auto low = static_cast<std::int16_t>(peek(reg::position_low));
+  const bool carries = -near_carry <= low && low < near_carry;
+  const bool torn = behaviour_.position_words_torn && carries && before && now_ - before->second <= just_now;
   return torn ? before->first : high;
 }
 
