@@ -1,5 +1,6 @@
 """The Python package as it is handed on: an sdist, and the wheel that is built from it away from the repository, without
 network."""
+import ast
 import email
 import shutil
 import subprocess
@@ -18,6 +19,13 @@ def run(*command, cwd):
     done = subprocess.run(command, cwd=cwd, capture_output=True, text=True, check=False)
     if done.returncode != 0:
         raise AssertionError(f"{command}: {done.stdout}{done.stderr}")
+
+
+def imported_by(path):
+    """Modules of the same package, also those that only a type checker imports."""
+    nodes = [node for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+             if isinstance(node, ast.ImportFrom) and node.level == 1]
+    return {name for node in nodes for name in ([node.module] if node.module else [alias.name for alias in node.names])}
 
 
 class Package(unittest.TestCase):
@@ -65,6 +73,15 @@ class Package(unittest.TestCase):
         self.assertEqual(len(metadata.get_all("Requires-Dist")), 2)
         self.assertIn("Typing :: Typed", metadata.get_all("Classifier"))
         self.assertIn("# axisd for Python", metadata.get_payload())
+
+    def test_no_modules_import_each_other(self):
+        imports = {path.stem: imported_by(path) for path in (ROOT / "api/python/axisd").glob("*.py")}
+        self.assertGreater(len(imports["machine"]), 5)
+        # Whatever imports nothing that is left is taken away; what stays goes round in circles.
+        while leaves := [name for name, others in imports.items() if not others & imports.keys()]:
+            for name in leaves:
+                del imports[name]
+        self.assertEqual(imports, {})
 
     def test_the_wheel_works_by_itself(self):
         with zipfile.ZipFile(self.wheel) as archive:

@@ -7,18 +7,16 @@ import dataclasses
 import uuid
 from collections.abc import AsyncGenerator, Iterable
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import Any, Literal, get_args
 
 from .calls import Seconds, command_options, did_you_mean, done, duration, number
+from .connection import Connection
 from .drive import Drive
 from .errors import ArgumentError, AxisdError, MotionError, RefusedError
 from .holds import StopHold
 from .reasons import Reason
 from .types import AxisState, Command, Link, Obstacle, in_cell
 from .v1 import axis_service_pb2, system_service_pb2, types_pb2
-
-if TYPE_CHECKING:
-    from .machine import Machine
 
 Explainable = Literal["enable", "disable", "home", "move", "move_relative", "velocity", "jog", "reset", "set_position"]
 _RAMPS = ("acceleration_time", "deceleration_time")
@@ -33,7 +31,7 @@ class Axis:
     wait=False they return once it is accepted (then: Machine.wait). Cancelling such a call in Python does not end the
     motion: halt() or stop() does. `request_id` repeats an earlier call without moving twice."""
 
-    def __init__(self, machine: Machine, name: str, lease_token: int = 0) -> None:
+    def __init__(self, machine: Connection, name: str, lease_token: int = 0) -> None:
         self._machine = machine
         self._lease_token = lease_token
         self.name = name

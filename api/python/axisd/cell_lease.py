@@ -2,16 +2,14 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Callable
 from types import TracebackType
-from typing import TYPE_CHECKING
 
 from .axis import Axis
 from .calls import Seconds
+from .connection import Connection
 from .errors import ArgumentError
 from .lease import LeasedBlock, LeaseInfo, OwnedLease
-
-if TYPE_CHECKING:
-    from .cells import Cell
 
 
 class CellLease(LeasedBlock):
@@ -21,7 +19,8 @@ class CellLease(LeasedBlock):
     LeaseLostError is raised at its end. A machine that cannot be reached any more ends its own lease after its time to
     live; its axes then do what their `on_lease_loss` says."""
 
-    def __init__(self, cell: Cell, axes: tuple[str, ...], ttl: Seconds | None, label: str, take: bool) -> None:
+    def __init__(self, connection_to: Callable[[str], Connection], axes: tuple[str, ...], ttl: Seconds | None, label: str,
+                 take: bool) -> None:
         super().__init__()
         wanted: dict[str, list[str]] = {}
         for name in axes:
@@ -29,7 +28,7 @@ class CellLease(LeasedBlock):
             wanted.setdefault(machine, []).append(axis)
         if not wanted:
             raise ArgumentError("a lease needs axes", "name them: cell.lease('press-1/feeder', ...)")
-        self._leases = {machine: OwnedLease(cell.machine(machine), tuple(wanted[machine]), ttl, label, take, self._lose)
+        self._leases = {machine: OwnedLease(connection_to(machine), tuple(wanted[machine]), ttl, label, take, self._lose)
                         for machine in sorted(wanted)}
 
     @property

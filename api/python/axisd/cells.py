@@ -15,8 +15,9 @@ from .cell.v1 import cell_service_pb2, cell_service_pb2_grpc
 from .cell_group import CellMove, request_of
 from .cell_lease import CellLease, split
 from .cell_types import CellEvent, CellInfo, CellMachine, CellReleased, CellStopped
+from .connection import channel_to
 from .drives import Cursor
-from .machine import Machine, channel_to
+from .machine import Machine
 from .tls_files import Path, TlsFiles
 
 
@@ -91,7 +92,7 @@ class Cell:
     def lease(self, *axes: str, ttl: Seconds | None = None, label: str = "", take: bool = False) -> CellLease:
         """The exclusive right to command these axes inside an `async with` block: cell.lease("press-1/feeder",
         "press-2/arm"). `ttl` and `take` as of Machine.lease()."""
-        return CellLease(self, axes, ttl, label, take)
+        return CellLease(self.machine, axes, ttl, label, take)
 
     async def move(self, targets: Mapping[str, float], *, relative: bool = False,
                    velocity: Mapping[str, float] | None = None, acceleration_time: Seconds | None = None,

@@ -4,15 +4,13 @@ from __future__ import annotations
 import contextlib
 import datetime
 from collections.abc import AsyncGenerator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from google.protobuf.duration_pb2 import Duration
 
+from .connection import Connection
 from .drives import DriveInfo, Parameter, Segments, SerialProgress
 from .v1 import drive_service_pb2
-
-if TYPE_CHECKING:
-    from .machine import Machine
 
 _MEMORY_TIME = 60.0  # s; saving and restoring take the drive's own time
 
@@ -21,7 +19,7 @@ class Drive:
     """Parameters, segments and address of a drive; made as Axis.drive. What changes the drive's memory needs standstill
     and the power stage off."""
 
-    def __init__(self, machine: Machine, axis: str, lease_token: int = 0) -> None:
+    def __init__(self, machine: Connection, axis: str, lease_token: int = 0) -> None:
         self._machine = machine
         self._lease_token = lease_token
         self.axis = axis

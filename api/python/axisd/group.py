@@ -7,19 +7,17 @@ import datetime
 import uuid
 from collections.abc import Iterable, Mapping
 from types import TracebackType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import grpc
 
 from .calls import Seconds, did_you_mean, duration, number
+from .connection import Connection
 from .errors import ArgumentError, AxisdError, MotionError, RefusedError, StopError
 from .holds import StopHold
 from .reasons import Outcome, Reason
 from .types import Command, CommandState, ErrorDetail, StopResult, _member, _optional_error
 from .v1 import group_service_pb2, types_pb2
-
-if TYPE_CHECKING:
-    from .machine import Machine
 
 
 def _seconds(raw: Any, name: str) -> float | None:
@@ -81,7 +79,7 @@ class Group:
     """A group of the configuration, or axes of this program's choice; made by Machine.group(). As an `async with` block
     it stops its axes when the block ends by an error or is cancelled."""
 
-    def __init__(self, machine: Machine, name: str, axes: tuple[str, ...], lease_token: int) -> None:
+    def __init__(self, machine: Connection, name: str, axes: tuple[str, ...], lease_token: int) -> None:
         self._machine = machine
         self._axes = axes
         self._lease_token = lease_token

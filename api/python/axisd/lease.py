@@ -8,15 +8,13 @@ import datetime
 import uuid
 from collections.abc import Callable
 from types import TracebackType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from .axis import Axis
 from .calls import Seconds, duration
+from .connection import Connection
 from .errors import AxisdError, LeaseLostError, RefusedError, UnreachableError
 from .v1 import lease_service_pb2
-
-if TYPE_CHECKING:
-    from .machine import Machine
 
 
 @dataclasses.dataclass(frozen=True)
@@ -39,7 +37,7 @@ class OwnedLease:
     """The lease of one machine: renewed by a task of its own from its acquisition on, until it is released or lost.
     `lost` is told why, once."""
 
-    def __init__(self, machine: Machine, axes: tuple[str, ...], ttl: Seconds | None, label: str, take: bool,
+    def __init__(self, machine: Connection, axes: tuple[str, ...], ttl: Seconds | None, label: str, take: bool,
                  lost: Callable[[AxisdError], None]) -> None:
         self._machine = machine
         self._request = lease_service_pb2.AcquireLeaseRequest(axes=axes, ttl=duration(ttl), label=label, take=take,
@@ -138,7 +136,7 @@ class Lease(LeasedBlock):
     the lease is lost, the block is cancelled and LeaseLostError raised at its end. If this program dies or its event
     loop hangs, the lease ends by itself and moving axes do what their `on_lease_loss` says."""
 
-    def __init__(self, machine: Machine, axes: tuple[str, ...], ttl: Seconds | None, label: str, take: bool) -> None:
+    def __init__(self, machine: Connection, axes: tuple[str, ...], ttl: Seconds | None, label: str, take: bool) -> None:
         super().__init__()
         self._lease = OwnedLease(machine, axes, ttl, label, take, self._lose)
 
