@@ -157,13 +157,19 @@ bool YakoRtuDrive::is_suspect(std::span<const std::uint16_t> registers, TimePoin
 }
 
 Task<Result<DriveSample>> YakoRtuDrive::read_again(TransactionClass transaction_class, std::int32_t suspect) {
-  auto answer = co_await node_.read(reg::mode, state_count, in(transaction_class));
-  if (!answer) co_return failed(answer.error());
+  Result<modbus_rtu::Answer> answer;
+  std::int32_t position = suspect;
+  // A genuine step stays; that three readings are torn alike is not to be expected.
+  for (int again = 0; again < 2; ++again) {
+    answer = co_await node_.read(reg::mode, state_count, in(transaction_class));
+    if (!answer) co_return failed(answer.error());
+    position = TornPosition::of_two(suspect, decode_state(answer->registers).position_pulses);
+    if (!torn_position_.suspects(position, answer->answered_at)) break;
+  }
   auto& registers = answer->registers;
-  const auto position =
-      static_cast<std::uint32_t>(TornPosition::of_two(suspect, decode_state(registers).position_pulses));
-  registers.at(reg::position_high - reg::mode) = static_cast<std::uint16_t>(position >> 16U);
-  registers.at(reg::position_low - reg::mode) = static_cast<std::uint16_t>(position & 0xFFFFU);
+  const auto words = static_cast<std::uint32_t>(position);
+  registers.at(reg::position_high - reg::mode) = static_cast<std::uint16_t>(words >> 16U);
+  registers.at(reg::position_low - reg::mode) = static_cast<std::uint16_t>(words & 0xFFFFU);
   co_return sample_of(answer->registers, answer->sent_at, answer->answered_at);
 }
 
