@@ -94,7 +94,7 @@ class YakoRtuDrive final : public Drive {
   // drive_connection.cpp
   /// One reading of the state, in the order of the readings.
   DriveSample sample_of(std::span<const std::uint16_t> registers, TimePoint asked_at, TimePoint measured_at);
-  /// The words of its position may be of two moments: it is read again, and the second is believed.
+  /// The words of its position may be of two moments: it is read again, at most twice.
   [[nodiscard]] bool is_suspect(std::span<const std::uint16_t> registers, TimePoint measured_at) const;
   Task<Result<DriveSample>> read_again(TransactionClass transaction_class, std::int32_t suspect);
   /// Reads what note_register() keeps: how far from its target the drive takes itself for in position, and
