@@ -143,12 +143,13 @@ void Axis::on_sample(const DriveSample& sample) {
   if (before && shaft_.hides_loss(*before, sample, turned_by, facts)) lose_trust();
   if (!sample.enabled) on_released(sample, before && before->enabled);
   watch_speed(SpeedWatch::Event::sampled);
-  const bool began = unseen_start_.look(
-      {.asked_at = sample.asked_at, .moving = sample.moving, .elsewhere = moved_from(unseen_start_.base())});
+  const bool began = stop_.unseen_start().look({.asked_at = sample.asked_at,
+                                                .moving = sample.moving,
+                                                .elsewhere = moved_from(stop_.unseen_start().base())});
   // A stop from before it began may have been ignored.
   if (began && stop_.under_way()) stop_.ask(StopKind::halt);
   // What a link that failed kept back was not heard, wherever the drive rests.
-  const bool rests = !sample.moving && !unseen_start_.may_begin();
+  const bool rests = !sample.moving && !stop_.unseen_start().may_begin();
   if (rests && link_.online() && !link_.bus_loss()) stop_.seen_at_rest();
   if (link_.online())
     observed_.on_sample(sample, busy());

@@ -43,7 +43,6 @@
 #include "devices/axis/terminal_motion.hpp"
 #include "devices/axis/terminals.hpp"
 #include "devices/axis/unknown_outcomes.hpp"
-#include "devices/axis/unseen_start.hpp"
 #include "devices/descriptor.hpp"
 #include "devices/drive.hpp"
 
@@ -487,7 +486,6 @@ class Axis {
 
   AxisLife life_;
   StopMachine stop_;
-  UnseenStart unseen_start_;
   PowerMachine power_;
 
   std::optional<DriveSample> sample_;

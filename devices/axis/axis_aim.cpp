@@ -106,7 +106,7 @@ Task<std::optional<Result<void>>> Axis::start_unmoved(ActivityPtr activity) {
     if (auto seen = co_await look(Duration{0}); !seen) co_return seen;
     if (!current(*activity) || !may_start(*activity)) co_return std::nullopt;
     if (auto way = check_way(*activity); !way) co_return way;
-    activity->number = unseen_start_.sending(tracker_.counter(), env_.clock->now());
+    activity->number = stop_.unseen_start().sending(tracker_.counter(), env_.clock->now());
     const auto triggered = co_await (*loaded)->trigger(sample_->asked_at + settings_.reboot_guard);
     if (triggered) {
       co_await (*loaded)->follow_up();

@@ -243,7 +243,7 @@ Task<Result<TimePoint>> Axis::Member::trigger(TimePoint not_after) {
   for (int attempt = 1;; ++attempt) {
     const auto seen_until = co_await look_again();
     if (!seen_until) co_return seen_until;
-    activity_->number = axis_->unseen_start_.sending(base_, axis_->env_.clock->now());
+    activity_->number = axis_->stop_.unseen_start().sending(base_, axis_->env_.clock->now());
     auto triggered = co_await loaded_->trigger(std::min(*seen_until, not_after));
     const bool grown_old = !triggered && triggered.error().reason == Reason::expired &&
                            axis_->env_.clock->now() < std::min(tied().not_after, not_after);
@@ -253,16 +253,16 @@ Task<Result<TimePoint>> Axis::Member::trigger(TimePoint not_after) {
 
 void Axis::Member::about_to_start() {
   activity_->start.about_to_start();
-  activity_->number = axis_->unseen_start_.sending(base_, axis_->env_.clock->now());
+  activity_->number = axis_->stop_.unseen_start().sending(base_, axis_->env_.clock->now());
 }
 
 void Axis::Member::not_started() {
   activity_->start.not_started();
-  axis_->unseen_start_.not_sent(activity_->number);
+  axis_->stop_.unseen_start().not_sent(activity_->number);
 }
 
 void Axis::Member::started(TimePoint at) {
-  axis_->unseen_start_.sent(activity_->number, axis_->env_.clock->now());
+  axis_->stop_.unseen_start().sent(activity_->number, axis_->env_.clock->now());
   started_at_ = at;
   activity_->start.begun();
   axis_->watch_speed(SpeedWatch::Event::begun);

@@ -65,7 +65,7 @@ Task<> Axis::run_home(ActivityPtr activity) {
       lose_trust();
       homed_before = sample_->homed;
       base = tracker_.counter();
-      activity->number = unseen_start_.sending(base, env_.clock->now());
+      activity->number = stop_.unseen_start().sending(base, env_.clock->now());
       result = co_await drive_->start_homing(**profile, guard(*activity));
     }
   }

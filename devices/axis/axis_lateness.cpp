@@ -59,7 +59,7 @@ void Axis::bound_start(const ActivityPtr& activity, bool waited, bool halting) {
   if (!waited && options.arrived != TimePoint{}) since = options.arrived;
   auto latest = since + settings_.start_within;
   if (halting) latest += stop_.deceleration() + settings_.stop_margin;
-  if (halting && unseen_start_.may_begin()) latest += start_window;  // so long its rest proves nothing
+  if (halting && stop_.unseen_start().may_begin()) latest += start_window;  // so long its rest proves nothing
   if (!waited) latest = std::min(latest, options.call_deadline);
   start_by(activity, since, latest);
 }

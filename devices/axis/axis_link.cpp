@@ -136,7 +136,7 @@ bool Axis::found_by_terminal() const {
 /// M4: a drive found moving without a live command is stopped, unless a terminal started it.
 Task<Result<void>> Axis::settle_found_motion() {
   std::string_view found = stop_.owed() ? "the stop that was owed to it was sent, and it came to rest" : "";
-  const bool may_move = found_in_motion() || (unseen_start_.may_begin() && stop_.left_running());
+  const bool may_move = found_in_motion() || (stop_.unseen_start().may_begin() && stop_.left_running());
   if (may_move && !found_by_terminal()) {
     if (!stop_.owed() && sample_->moving) {  // else it may rest between the phases of homing, or for good
       log_about_axis(spdlog::level::warn, LogKind::moving_without_command, settings_,
@@ -146,7 +146,7 @@ Task<Result<void>> Axis::settle_found_motion() {
     stop_.owe();
     bool rests = false, began = false;
     for (auto kind = StopKind::stop;; kind = began ? kind : StopKind::quick_stop) {
-      const auto begun = unseen_start_.begun();
+      const auto begun = stop_.unseen_start().begun();
       const auto sent = co_await drive_->stop(kind);
       const bool may_have_come = sent || sent.error().outcome == Outcome::unknown;
       if (kind == StopKind::quick_stop && may_have_come && !drive_->closed_loop()) lose_trust();
@@ -154,7 +154,7 @@ Task<Result<void>> Axis::settle_found_motion() {
       const auto braking = std::max(stop_.deceleration(), braking_time(kind));
       const auto deadline = env_.clock->now() + braking + settings_.stop_margin;
       rests = co_await standstill_unpolled(deadline, false);
-      began = unseen_start_.begun() != begun;  // once for each start: that stop may have been ignored
+      began = stop_.unseen_start().begun() != begun;  // once for each start: that stop may have been ignored
       if (!rests && !began && sample_->asked_at < deadline)  // silent: it begins anew, with a stop
         co_return fail(error(Reason::no_reply, "the drive fell silent while it was being stopped",
                              "check power and wiring"));
@@ -335,7 +335,7 @@ void Axis::on_reboot(const Error& cause) {
   if (activity_ && activity_->start.may_run()) told.outcome = Outcome::unknown;  // it may have started before
   supersede(told);
   stop_.restarted();
-  unseen_start_.restarted();
+  stop_.unseen_start().restarted();
   lose_trust();
   tracker_.restart(sample_ ? sample_->position_pulses : 0);
   publish();

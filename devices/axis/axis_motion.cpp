@@ -180,13 +180,13 @@ Task<bool> Axis::positioned(ActivityPtr activity) {
       if (may_move_by_itself()) {
         auto triggered = co_await start_unmoved(activity);
         if (!triggered) {
-          unseen_start_.not_sent(activity->number);
+          stop_.unseen_start().not_sent(activity->number);
           co_return false;
         }
         result = *std::move(triggered);
         base = tracker_.counter();
       } else {
-        activity->number = unseen_start_.sending(base, env_.clock->now());
+        activity->number = stop_.unseen_start().sending(base, env_.clock->now());
         result = co_await drive_->start_move(profile_of(activity->plan), guard(*activity));
       }
       if (result || result.error().outcome == Outcome::unknown) tracker_.forget_base();
@@ -254,7 +254,7 @@ Task<> Axis::run_velocity(ActivityPtr activity) {
     if (!current(*activity) || !may_start(*activity)) co_return;
     base = tracker_.counter();
     if (result) {
-      activity->number = unseen_start_.sending(base, env_.clock->now());
+      activity->number = stop_.unseen_start().sending(base, env_.clock->now());
       result = co_await drive_->start_velocity(profile, guard(*activity));
     }
   }
@@ -277,9 +277,9 @@ void Axis::end_unsent(Activity& activity, Error cause) {
 Task<bool> Axis::started(ActivityPtr activity, Result<void> result, std::int64_t base, TimePoint since) {
   const bool sent = result || result.error().outcome == Outcome::unknown;
   if (sent)
-    unseen_start_.sent(activity->number, since);
+    stop_.unseen_start().sent(activity->number, since);
   else
-    unseen_start_.not_sent(activity->number);
+    stop_.unseen_start().not_sent(activity->number);
   if (!current(*activity)) co_return false;
   if (sent) activity->start.begun();
   watch_speed(SpeedWatch::Event::begun);

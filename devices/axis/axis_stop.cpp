@@ -90,7 +90,7 @@ Duration Axis::braking_time(StopKind kind) const {
 /// of the motion before it in force.
 void Axis::leave_running(const Activity& activity) {
   if (!activity.start.may_run()) return;
-  unseen_start_.left(env_.clock->now());
+  stop_.unseen_start().left(env_.clock->now());
   const auto& plan = activity.plan;
   stop_.set_deceleration(
       std::max(plan.deceleration_time, plan.granted.deceleration_time.value_or(Duration{})));
@@ -220,7 +220,7 @@ Task<RestVerdict> Axis::standstill_by(bool acknowledged, TimePoint deadline) {
   const auto since = env_.clock->now();
   StandstillWatch watch(since, deadline);
   while (link_.online() && !stop_.overtaken()) {
-    if (sample_ && !unseen_start_.may_begin()) {
+    if (sample_ && !stop_.unseen_start().may_begin()) {
       const auto found = watch.look(*sample_, tracker_.counter(), drive_->position_window());
       if (found != RestVerdict::undecided) co_return found;
       if (!acknowledged && sample_->moving && sample_->asked_at >= since) co_return RestVerdict::undecided;
@@ -237,14 +237,14 @@ Task<bool> Axis::standstill_unpolled(TimePoint deadline, bool of_stop) {
   const auto another = [&] { return of_stop && stop_.overtaken(); };
   UnpolledStandstill watch(deadline);
   for (;;) {
-    const auto begun = unseen_start_.begun();
+    const auto begun = stop_.unseen_start().begun();
     const auto sample = co_await drive_->read_state(TransactionClass::moving_state);
     if (sample) on_sample(*sample);
-    if (another() || unseen_start_.begun() != begun) co_return false;
+    if (another() || stop_.unseen_start().begun() != begun) co_return false;
     auto found = RestVerdict::undecided;
     if (!sample)
       found = watch.silence();
-    else if (!unseen_start_.may_begin())
+    else if (!stop_.unseen_start().may_begin())
       found = watch.look(*sample, tracker_.counter(), drive_->position_window());
     if (found != RestVerdict::undecided) co_return found == RestVerdict::rests;
     // Samples of somebody else who looks do not shorten it.

@@ -13,6 +13,7 @@
 #include "devices/axis/command_record.hpp"
 #include "devices/axis/standstill.hpp"
 #include "devices/axis/stop_holds.hpp"
+#include "devices/axis/unseen_start.hpp"
 
 namespace axisd {
 
@@ -116,6 +117,10 @@ class StopMachine {
   /// A stop, a disable or a cancel arrived then at the server.
   void arrived(TimePoint at) { arrived_ = std::max(arrived_, at); }
 
+  /// The newest start, until a reading shows it: before that rest is no standstill.
+  [[nodiscard]] UnseenStart& unseen_start() { return unseen_start_; }
+  [[nodiscard]] const UnseenStart& unseen_start() const { return unseen_start_; }
+
   /// What of it the axis shows (M14).
   enum class Shown : std::uint8_t {
     nothing,
@@ -195,6 +200,7 @@ class StopMachine {
   Duration deceleration_ = milliseconds(2000);
   std::uint64_t failures_ = 0;
   TimePoint arrived_{};
+  UnseenStart unseen_start_;
 };
 
 }  // namespace axisd

@@ -75,8 +75,8 @@ void SimulatedDrive::power_up() {
   homed_ = false;
   alarm_ = cause_;
   activity_ = last_activity_ = Activity::none;
-  multi_speed_on_ = stopping_ = false;
-  segment_due_ = clear_due_ = homing_due_ = start_due_ = TimePoint::max();
+  multi_speed_.on = stopping_ = false;
+  segment_due_ = clear_due_ = homing_due_ = TimePoint::max();
   later_.reset();
   terminals_.settle(motor_.shaft(), memory_);
 }
@@ -126,8 +126,8 @@ void SimulatedDrive::advance(TimePoint now) {
 TimePoint SimulatedDrive::next_event() const {
   if (!powered_) return TimePoint::max();
   if (boot_end_) return *boot_end_;
-  auto next =
-      std::min({motor_.ends(), terminals_.next_event(), segment_due_, clear_due_, homing_due_, start_due_});
+  auto next = std::min({motor_.ends(), terminals_.next_event(), segment_due_, clear_due_, homing_due_,
+                        later_ ? later_->due : TimePoint::max()});
   if (motor_.moving()) {
     const auto change = terminals_.next_switch(motor_.shaft(), motor_.direction());
     if (change) next = std::min(next, motor_.reaches(*change));
@@ -152,7 +152,7 @@ void SimulatedDrive::step(TimePoint now) {
   if (ended && !motor_.moving()) on_stopped();
   if (homing_due_ <= now) homing_stopped();
   if (segment_due_ <= now) start_segment();
-  if (start_due_ <= now) start_now();
+  if (later_ && later_->due <= now) start_now();
   if (clear_due_ <= now) {
     clear_due_ = TimePoint::max();
     clear_counter();

@@ -70,6 +70,12 @@ class SimulatedDrive final : public simulation::SimulatedRtuNode {
     int turns = 0;
   };
 
+  /// One that was acknowledged, and begins then.
+  struct LateStart {
+    Plan plan;
+    TimePoint due;
+  };
+
   // simulator.cpp: power, time, state
   void step(TimePoint now);
   void clear_counter();
@@ -163,12 +169,13 @@ class SimulatedDrive final : public simulation::SimulatedRtuNode {
   Activity activity_ = Activity::none;
   Activity last_activity_ = Activity::none;  ///< what was started last
   std::optional<Plan> pending_;              ///< begins when the motor has stopped
-  std::optional<Plan> later_;                ///< begins at start_due_
-  TimePoint start_due_ = TimePoint::max();
+  std::optional<LateStart> later_;
   std::int64_t last_target_ = 0;  ///< shaft position of the last position move
   bool stopping_ = false;         ///< the motion will not complete
-  bool multi_speed_on_ = false;   ///< PV is enabled
-  int multi_speed_rpm_ = 0;       ///< signed, what PV runs at
+  struct {
+    bool on = false;  ///< it is enabled
+    int rpm = 0;      ///< signed, what it runs at
+  } multi_speed_;     ///< PV
   TimePoint pins_changed_{};
   TimePoint segment_due_ = TimePoint::max();  ///< PT start, 5 ms after its edge
   TimePoint clear_due_ = TimePoint::max();    ///< 0x002C takes effect

@@ -79,14 +79,12 @@ Fail SimulatedDrive::begin(const Plan& plan) {
 bool SimulatedDrive::starts_later(const Plan& plan) {
   if (!behaviour_.starts_late || motor_.moving()) return false;
   if (later_) return true;
-  later_ = plan;
-  start_due_ = now_ + std::chrono::milliseconds(80);
+  later_ = {.plan = plan, .due = now_ + std::chrono::milliseconds(80)};
   return true;
 }
 
 void SimulatedDrive::start_now() {
-  start_due_ = TimePoint::max();
-  const auto plan = *std::exchange(later_, std::nullopt);
+  const auto plan = std::exchange(later_, std::nullopt)->plan;
   if (!enabled() || alarm_ != 0 || motor_.moving()) return;
   ++starts_;
   plan.activity == Activity::homing ? begin_homing() : launch(plan);
@@ -120,7 +118,7 @@ void SimulatedDrive::stop_command(bool emergency) {
 
 void SimulatedDrive::stop_motion(bool emergency) {
   pending_.reset();
-  multi_speed_on_ = false;
+  multi_speed_.on = false;
   segment_due_ = TimePoint::max();
   if (homing_due_ != TimePoint::max()) finish();
   if (!motor_.moving()) return;
@@ -139,7 +137,7 @@ void SimulatedDrive::stop_motion(bool emergency) {
 /// No more pulses, and nothing goes on afterwards.
 void SimulatedDrive::cut() {
   pending_.reset();
-  multi_speed_on_ = false;
+  multi_speed_.on = false;
   segment_due_ = TimePoint::max();
   if (homing_due_ != TimePoint::max()) finish();
   if (!motor_.moving()) return;
@@ -224,9 +222,9 @@ void SimulatedDrive::on_motion_edge(const InputEdge& edge) {
       break;
     case Input::pv_enable:
       if (edge.rising)
-        multi_speed_on_ = enabled() && alarm_ == 0 && !motor_.moving();
+        multi_speed_.on = enabled() && alarm_ == 0 && !motor_.moving();
       else if (!behaviour_.pv_latched)
-        multi_speed_on_ = false;
+        multi_speed_.on = false;
       break;
     default:
       break;
@@ -281,7 +279,7 @@ void SimulatedDrive::start_segment() {
 /// 7.4: the speed follows the selection, with the time of the newly selected segment; without one the motor
 /// brakes.
 void SimulatedDrive::update_multi_speed() {
-  const int segment = multi_speed_on_ ? terminals_.segment() : 0;
+  const int segment = multi_speed_.on ? terminals_.segment() : 0;
   const auto at = [&](std::uint16_t first) { return static_cast<std::uint16_t>(first + segment - 1); };
   const int magnitude = segment == 0 ? 0 : memory_.get(at(reg::segment_pv_speed));
   const int direction = terminals_.active(Input::pv_direction) ? -1 : 1;
@@ -289,16 +287,16 @@ void SimulatedDrive::update_multi_speed() {
   if (activity_ != Activity::pv) {
     if (wanted == 0 || motor_.moving()) return;
     const double time = memory_.get(at(reg::segment_time));
-    multi_speed_rpm_ = wanted;
+    multi_speed_.rpm = wanted;
     begin({.activity = Activity::pv,
            .target = {},
            .direction = direction,
            .rates = rates(magnitude, time, time)});
     return;
   }
-  if (stopping_ || wanted == multi_speed_rpm_) return;
-  const bool turns = wanted == 0 || (wanted < 0) != (multi_speed_rpm_ < 0);
-  multi_speed_rpm_ = wanted;
+  if (stopping_ || wanted == multi_speed_.rpm) return;
+  const bool turns = wanted == 0 || (wanted < 0) != (multi_speed_.rpm < 0);
+  multi_speed_.rpm = wanted;
   if (turns) {
     stopping_ = true;  // and begins anew from standstill, if there is something to run
     motor_.brake();
