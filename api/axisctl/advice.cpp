@@ -71,7 +71,7 @@ std::string in_own_words(std::string_view text) {
 }
 
 std::string advice(std::string_view remedy, std::string_view subject) {
-  const auto own = in_own_words(remedy);
+  auto own = in_own_words(remedy);
   const auto machine = machine_in(subject);
   if (machine.empty()) return own;
   std::string text;
