@@ -96,7 +96,8 @@ Lobby::Speakers Lobby::take_speakers() {
   const int count = epoll_wait(told_.get(), events.data(), most_told, 0);
   Speakers speakers{.guests = {}, .all = count < most_told};
   for (int i = 0; i < count; ++i) {
-    const auto found = guests_.find(events[static_cast<std::size_t>(i)].data.u64);
+    const std::uint64_t told = events[static_cast<std::size_t>(i)].data.u64;  // it is packed: no reference
+    const auto found = guests_.find(told);
     if (found == guests_.end()) continue;
     const auto id = found->first;
     const int socket = found->second.socket.get();
