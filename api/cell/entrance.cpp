@@ -20,7 +20,6 @@ transport::StreamBudget::Limits streams_beside(const Settings& settings) {
   transport::StreamBudget::Limits limits;
   limits.lasting += settings.calls;
   limits.idle += settings.calls;
-  limits.suspect += settings.calls;
   return limits;
 }
 

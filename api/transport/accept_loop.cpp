@@ -60,7 +60,7 @@ Result<void> AcceptLoop::start(std::vector<Entry> entries, const PeerBudgets::Li
   streams_.emplace(streams);
   streams_of_one_ = streams.of_one;
   trims_.emplace(resident_memory());
-  relief_.emplace(limits.memory);
+  memory_limit_ = limits.memory;
   leaving_ = limits.leaving;
   in_progress_ = std::move(in_progress);
   entries_ = std::move(entries);
@@ -204,10 +204,7 @@ void AcceptLoop::look_at_streams(const std::vector<PeerBudgets::Id>& ids, TimePo
   for (const auto& [id, bytes] : unread) {
     const auto& peer = connections_.at(id).peer;
     const auto found = counts.find(peer);
-    if (found == counts.end()) {
-      streams_->unknown(id, now);
-      continue;
-    }
+    if (found == counts.end()) continue;  // gRPC does not have it yet
     const auto& [started, ended] = found->second;
     const int in_progress = in_progress_ ? in_progress_(peer) : 0;
     streams_->seen(id, {.started = started, .ended = ended, .in_progress = in_progress}, bytes, now);
@@ -248,32 +245,15 @@ void AcceptLoop::look_at_memory(TimePoint now) {
   if (now - looked_ < memory_every) return;
   looked_ = now;
   const auto bytes = resident_memory();
-  if (relief_->due(now, bytes)) relieve_memory(now);
+  if (bytes > memory_limit_)
+    if (const auto most = budgets_->most_one_sided())
+      cut_off(*most, "has sent most without an answer, and memory is short");
   if (streams_gone_ >= many_streams) {
     streams_gone_ = 0;
     trims_->let_go(now);
   }
-  if (const auto left = trimmer_.take_left(); left > 0) {
-    trims_->trimmed(left);
-    relief_->measured(now);
-  }
+  if (const auto left = trimmer_.take_left(); left > 0) trims_->trimmed(left);
   if (trims_->due(now, bytes)) trimmer_.trim();
-}
-
-void AcceptLoop::relieve_memory(TimePoint now) {
-  std::vector<PeerBudgets::Id> all;
-  for (const auto& [id, connection] : connections_)
-    if (!connection.peer.empty()) all.push_back(id);
-  look_at_streams(all, now);
-  const auto sent = budgets_->most_one_sided();
-  const auto kept = streams_->most_lasting(now);
-  if (!sent && !kept) return;
-  const double of_streams = kept ? static_cast<double>(kept->streams) * StreamBudget::memory_of_one : 0;
-  if (sent && sent->bytes >= of_streams)
-    cut_off(sent->id, "has sent most without an answer, and memory is short");
-  else
-    cut_off(kept->id, "keeps most streams open, and memory is short");
-  relief_->cut_off(now);
 }
 
 bool AcceptLoop::accept_one(const Entry& entry) {

@@ -96,8 +96,6 @@ class AcceptLoop {
   void look_at_hand_over(HandOverThread& way, TimePoint now);
   /// Has what is free given back to the system, and cuts off who made it necessary.
   void look_at_memory(TimePoint now);
-  /// Cuts off whoever may have most of it, by what it has sent or by the streams that it keeps.
-  void relieve_memory(TimePoint now);
   void blame(PeerBudgets::Id id, std::string_view why, TimePoint now);
   void cut_off(PeerBudgets::Id id, std::string_view why);
   /// It is over at both ends. Counts what has come since it was counted last.
@@ -120,7 +118,7 @@ class AcceptLoop {
   std::optional<TrimPlan> trims_;
   TimePoint counted_{}, looked_{};
   Duration count_every_{};
-  std::optional<ReliefPlan> relief_;
+  std::size_t memory_limit_ = 0;  ///< bytes
   Duration leaving_{};
   std::int64_t streams_of_one_ = 0;
   std::int64_t streams_gone_ = 0;  ///< of those that have left, since memory was looked after for it

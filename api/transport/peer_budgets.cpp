@@ -95,11 +95,11 @@ void PeerBudgets::blame(Id id, TimePoint now) {
   if (found != connections_.end()) keep_out(addresses_.at(found->second.address), limits_.burst, now);
 }
 
-std::optional<PeerBudgets::OneSided> PeerBudgets::most_one_sided() const {
+std::optional<PeerBudgets::Id> PeerBudgets::most_one_sided() const {
   const auto most =
       std::ranges::max_element(connections_, {}, [](const auto& entry) { return entry.second.one_sided; });
   if (most == connections_.end() || most->second.one_sided <= limits_.suspect) return std::nullopt;
-  return OneSided{.id = most->first, .bytes = most->second.one_sided};
+  return most->first;
 }
 
 std::vector<PeerBudgets::Id> PeerBudgets::count(const std::map<Id, Traffic>& traffic, TimePoint now) {

@@ -64,13 +64,9 @@ class PeerBudgets {
   void blame(Id id, TimePoint now);
   /// Takes over what was counted by now. Those to cut off, which are to leave then.
   [[nodiscard]] std::vector<Id> count(const std::map<Id, Traffic>& traffic, TimePoint now);
-  struct OneSided {
-    Id id;
-    double bytes;
-  };
   /// Who has sent most without getting anything for it since it began: streams that never end take memory
   /// however slowly they are begun. Nothing: nobody has sent more than `suspect`.
-  [[nodiscard]] std::optional<OneSided> most_one_sided() const;
+  [[nodiscard]] std::optional<Id> most_one_sided() const;
   [[nodiscard]] std::size_t connections() const { return connections_.size(); }
   /// That are remembered: with connections, or a bucket that is not empty yet.
   [[nodiscard]] std::size_t addresses() const { return addresses_.size(); }

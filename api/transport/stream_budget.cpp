@@ -86,15 +86,6 @@ void StreamBudget::seen(Id id, const Seen& seen, std::uint64_t unread, TimePoint
   before = {.at = now, .ended = seen.ended, .idle = connection.idle};
 }
 
-void StreamBudget::unknown(Id id, TimePoint now) {
-  const auto found = connections_.find(id);
-  if (found == connections_.end()) return;
-  auto& connection = found->second;
-  connection.looked = now;
-  connection.idle = connection.lasting = 0;
-  connection.before.reset();
-}
-
 std::vector<StreamBudget::Id> StreamBudget::beyond(TimePoint now) const {
   std::vector<Id> cut;
   for (const auto& [id, each] : connections_)
@@ -103,20 +94,6 @@ std::vector<StreamBudget::Id> StreamBudget::beyond(TimePoint now) const {
   shed(cut, limits_.lasting, [&](const auto& each) { return known(each) ? each.lasting : 0; });
   shed(cut, limits_.idle, [&](const auto& each) { return known(each) ? each.idle : 0; });
   return cut;
-}
-
-std::optional<StreamBudget::Lasting> StreamBudget::most_lasting(TimePoint now) const {
-  std::map<std::string, std::int64_t> of_address;
-  const auto lasting = [now](const Connection& each) {
-    return now - each.looked <= known_for ? each.lasting : 0;
-  };
-  for (const auto& [id, each] : connections_) of_address[each.address] += lasting(each);
-  const auto worst = std::ranges::max_element(of_address, {}, [](const auto& entry) { return entry.second; });
-  if (worst == of_address.end() || worst->second <= limits_.suspect) return std::nullopt;
-  const auto own = [&](const auto& entry) {
-    return entry.second.address == worst->first ? lasting(entry.second) : -1;
-  };
-  return Lasting{.id = std::ranges::max_element(connections_, {}, own)->first, .streams = worst->second};
 }
 
 void StreamBudget::shed(std::vector<Id>& cut, std::int64_t most, const Measure& measure) const {

@@ -30,13 +30,11 @@ class StreamBudget {
     std::int64_t of_one = told + 1024;
     std::int64_t lasting = 3072;  ///< of all together
     std::int64_t idle = 8192;     ///< of all together: more than pass by where all clients are busy
-    std::int64_t suspect = 8;     ///< that last, of one address: see most_lasting()
   };
   /// What gRPC counts since a connection began, and the calls that are in progress there.
   struct Seen {
     std::int64_t started = 0, ended = 0, in_progress = 0;
   };
-  static constexpr double memory_of_one = 12 * 1024;  ///< bytes that a stream costs gRPC
   /// A stream begins with a frame of so many bytes at least.
   static constexpr std::uint64_t least_bytes = 10;
   /// Between two looks at streams that last.
@@ -57,18 +55,8 @@ class StreamBudget {
   [[nodiscard]] std::vector<Id> doubtful(TimePoint now) const;
   /// `unread`: bytes that gRPC has not read yet.
   void seen(Id id, const Seen& seen, std::uint64_t unread, TimePoint now);
-  /// gRPC does not know it: not yet, or not any more. Others are asked about first then.
-  void unknown(Id id, TimePoint now);
   /// Whom to cut off, and who is to leave then.
   [[nodiscard]] std::vector<Id> beyond(TimePoint now) const;
-  struct Lasting {
-    Id id;
-    std::int64_t streams;  ///< of its address
-  };
-  /// Of the address that has most streams that last, by the looks within `known_for`, the connection that has
-  /// most: answers that are not taken cost more than the streams do. Nothing: no address has more than
-  /// `suspect`.
-  [[nodiscard]] std::optional<Lasting> most_lasting(TimePoint now) const;
 
  private:
   struct Connection {

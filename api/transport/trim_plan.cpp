@@ -29,13 +29,4 @@ void TrimPlan::trimmed(std::size_t resident) {
   if (resident > 0) left_ = resident;
 }
 
-bool ReliefPlan::due(TimePoint now, std::size_t resident) const {
-  return resident > limit_ && (!cut_off_at_ || now - *cut_off_at_ >= settled_within);
-}
-
-void ReliefPlan::measured(TimePoint now) {
-  // One that began before says nothing of it.
-  if (cut_off_at_ && now - *cut_off_at_ >= TrimPlan::settled_after) cut_off_at_.reset();
-}
-
 }  // namespace axisd::transport

@@ -3,7 +3,6 @@
 
 #include <chrono>
 #include <cstddef>
-#include <optional>
 
 #include "buses/clock.hpp"
 
@@ -40,26 +39,6 @@ class TrimPlan {
   int owed_ = 0;      ///< tries; 0: level
   Duration pause_ = first_pause;
   TimePoint next_{};
-};
-
-/// When somebody is to be cut off because memory is short: not again before it can be told what the last one
-/// has freed, by a try to give it back, or after a while. Thread: one at a time.
-class ReliefPlan {
- public:
-  static constexpr Duration settled_within = std::chrono::milliseconds(1500);
-
-  /// `limit`: bytes of this process.
-  explicit ReliefPlan(std::size_t limit) : limit_(limit) {}
-
-  /// `resident`: as of TrimPlan.
-  [[nodiscard]] bool due(TimePoint now, std::size_t resident) const;
-  void cut_off(TimePoint now) { cut_off_at_ = now; }
-  /// A try has ended.
-  void measured(TimePoint now);
-
- private:
-  std::size_t limit_;
-  std::optional<TimePoint> cut_off_at_;  ///< until it is known what that has freed
 };
 
 }  // namespace axisd::transport

@@ -65,33 +65,5 @@ TEST_F(TrimPlanTest, WhatTheSystemDoesNotSayIsNoMemory) {
   EXPECT_EQ(tries(100 * mib, 100 * mib, 1h), 0) << "it is taken for as much as before";
 }
 
-class ReliefPlanTest : public ::testing::Test {
- protected:
-  using ReliefPlan = transport::ReliefPlan;
-  TimePoint now_ = TimePoint{} + 1h;
-  ReliefPlan plan_{192 * mib};
-};
-
-TEST_F(ReliefPlanTest, MemoryIsShortAboveItsLimit) {
-  EXPECT_FALSE(plan_.due(now_, 192 * mib));
-  EXPECT_TRUE(plan_.due(now_, 193 * mib));
-}
-
-/// What one had is free only a while after its end: the next one is not to pay for that.
-TEST_F(ReliefPlanTest, OneIsCutOffAtATime) {
-  plan_.cut_off(now_);
-  EXPECT_FALSE(plan_.due(now_ + ReliefPlan::settled_within - 1ms, 250 * mib));
-  EXPECT_TRUE(plan_.due(now_ + ReliefPlan::settled_within, 250 * mib));
-}
-
-TEST_F(ReliefPlanTest, WhatATryHasLeftTellsSooner) {
-  plan_.cut_off(now_);
-  plan_.measured(now_ + TrimPlan::settled_after - 1ms);  // it has begun before
-  EXPECT_FALSE(plan_.due(now_ + TrimPlan::settled_after, 250 * mib));
-  plan_.measured(now_ + TrimPlan::settled_after);
-  EXPECT_TRUE(plan_.due(now_ + TrimPlan::settled_after, 250 * mib));
-  EXPECT_FALSE(plan_.due(now_ + TrimPlan::settled_after, 100 * mib));
-}
-
 }  // namespace
 }  // namespace axisd::testing
