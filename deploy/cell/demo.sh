@@ -323,7 +323,7 @@ To cut off a machine, and to join it again:
   ip -n $prefix-wire link set press-2 master switch
 Logs and configurations are in $dir.
 END
-  while [ "$(jobs -rp | wc -l)" -gt 0 ]; do sleep 1; done
+  wait "${pids[@]}" || true
   die "everything ended by itself"
 fi
 say "Ending"
