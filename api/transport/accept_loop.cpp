@@ -204,7 +204,10 @@ void AcceptLoop::look_at_streams(const std::vector<PeerBudgets::Id>& ids, TimePo
   for (const auto& [id, bytes] : unread) {
     const auto& peer = connections_.at(id).peer;
     const auto found = counts.find(peer);
-    if (found == counts.end()) continue;  // gRPC does not have it yet
+    if (found == counts.end()) {
+      streams_->unknown(id, now);
+      continue;
+    }
     const auto& [started, ended] = found->second;
     const int in_progress = in_progress_ ? in_progress_(peer) : 0;
     streams_->seen(id, {.started = started, .ended = ended, .in_progress = in_progress}, bytes, now);

@@ -86,6 +86,15 @@ void StreamBudget::seen(Id id, const Seen& seen, std::uint64_t unread, TimePoint
   before = {.at = now, .ended = seen.ended, .idle = connection.idle};
 }
 
+void StreamBudget::unknown(Id id, TimePoint now) {
+  const auto found = connections_.find(id);
+  if (found == connections_.end()) return;
+  auto& connection = found->second;
+  connection.looked = now;
+  connection.idle = connection.lasting = 0;
+  connection.before.reset();
+}
+
 std::vector<StreamBudget::Id> StreamBudget::beyond(TimePoint now) const {
   std::vector<Id> cut;
   for (const auto& [id, each] : connections_)

@@ -55,6 +55,8 @@ class StreamBudget {
   [[nodiscard]] std::vector<Id> doubtful(TimePoint now) const;
   /// `unread`: bytes that gRPC has not read yet.
   void seen(Id id, const Seen& seen, std::uint64_t unread, TimePoint now);
+  /// gRPC does not know it: not yet, or not any more. Others are asked about first then.
+  void unknown(Id id, TimePoint now);
   /// Whom to cut off, and who is to leave then.
   [[nodiscard]] std::vector<Id> beyond(TimePoint now) const;
 

@@ -204,6 +204,24 @@ TEST_F(StreamBudgetTest, ButNotWithoutEnd) {
   EXPECT_THAT(look(0ms), ElementsAre(5));
 }
 
+/// As one that waits to be handed over.
+TEST_F(StreamBudgetTest, WhoGrpcDoesNotKnowTakesNoLooksFromOthers) {
+  for (Id id = 1; id <= 60; ++id) {
+    enter(id, "a");
+    begin(id, 4);
+  }
+  std::set<Id> asked;
+  for (int i = 0; i < 20; ++i, now_ += 10ms)
+    for (const auto id : budget_.doubtful(now_)) {
+      asked.insert(id);
+      if (id <= 30)
+        budget_.unknown(id, now_);
+      else
+        budget_.seen(id, peers_.at(id).has, 0, now_);
+    }
+  EXPECT_THAT(asked, SizeIs(60));
+}
+
 TEST_F(StreamBudgetTest, WhatWasSeenLongAgoCountsAgainstNobody) {
   enter(1, "a"), enter(2, "a"), enter(3, "a");
   begin(1, 90), begin(2, 90), begin(3, 30);
