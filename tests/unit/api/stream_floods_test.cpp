@@ -181,7 +181,7 @@ TEST_P(StreamFloods, ANewConnectionFromAPortThatWasKnownIsCountedAnew) {
 
 /// Each is gone before anybody looks, and gRPC reads all that it leaves.
 TEST_P(StreamFloods, WhatIsSentJustBeforeTheEndCounts) {
-  serve({}, {.rate = 64 * 1024, .burst = 256 * 1024});
+  serve({}, {.rate = 4 * 1024, .burst = 256 * 1024});
   bool turned_away = false;
   for (int i = 0; i < 60 && !turned_away; ++i) {
     leavers_.clear();
