@@ -116,7 +116,7 @@ void Bench::finish(int starts) {
 
 double close_to_target(const Setup& setup) {
   constexpr double usual_mm = 0.05, window_pulses = 10, window_turns = 0.001, noise_pulses = 3;
-  if (!setup.manual.is_a_make()) return usual_mm;
+  if (!setup.manual.is_a_make()) return usual_mm + (setup.variant.noise / pulses_per_mm(setup.manual));
   const auto counts = static_cast<double>(setup.manual.counts());
   const auto pulses = std::max(window_pulses, window_turns * counts) + noise_pulses;
   return std::max(usual_mm, pulses / pulses_per_mm(setup.manual));

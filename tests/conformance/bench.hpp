@@ -90,9 +90,9 @@ class Bench {
   std::map<std::string, std::string> terminals_;
 };
 
-/// How far a load may rest beside its target, mm: a closed loop a few pulses; the drive of a maker that has
-/// no window of its own as far as axisd takes for in position (10 pulses, or 1/1000 revolution), and noise
-/// (M10).
+/// How far a load may rest beside its target, or its position be read beside it, mm: a closed loop a few
+/// pulses; the drive of a maker that has no window of its own as far as axisd takes for in position (10
+/// pulses, or 1/1000 revolution); and noise (M10).
 double close_to_target(const Setup& setup);
 
 // Expectations. Each says what was the case instead.

@@ -1,11 +1,11 @@
 // gtest's main, and:
-//   test_conformance --noise COUNTS                            all of the suite with such encoders, instead
-//   of 1 test_conformance --matrix                                  prints the capability matrix
-//   test_conformance --indexings COUNT [MODEL]                 moves by thirds of a unit: do they add up?
-//   test_conformance --random-moves COUNT [MODEL]              of any size: is each exact, and none refused?
-//   test_conformance --vcan AXISD AXISD_SIM [NAME]             runs the scenarios against these programs, on
-//   vcan
-//   test_conformance --vcan-sample AXISD AXISD_SIM PART OF     each of them at least once, in parts
+//   test_conformance --noise COUNTS                         all of the suite with such encoders
+//   test_conformance --matrix                               prints the capability matrix
+//   test_conformance --indexings COUNT [MODEL]              moves by thirds of a unit: do they add up?
+//   test_conformance --random-moves COUNT [MODEL]           of any size: is each exact, none refused?
+//   test_conformance --vcan AXISD AXISD_SIM [PART]          runs them against these programs, on vcan;
+//                                                           PART of "MODEL SCENARIO" selects some
+//   test_conformance --vcan-sample AXISD AXISD_SIM PART OF  each of them at least once, in parts
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <spdlog/spdlog.h>

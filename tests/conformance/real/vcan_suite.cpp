@@ -56,7 +56,8 @@ std::vector<Job> all_jobs(const std::vector<Manual>& manuals, std::string_view n
     for (const auto& subject : subjects())
       for (const auto& scenario : subject.scenarios) {
         const bool left_out = manual.lacks(scenario.name) || manual.skipped(scenario.name) != nullptr;
-        if (left_out || scenario.name.find(named) == std::string_view::npos) continue;
+        const auto name = fmt::format("{} {}", manual.name(), scenario.name);
+        if (left_out || name.find(named) == std::string::npos) continue;
         all.push_back({.scenario = &scenario, .manual = &manual, .variant = {}});
         if (subject.name == "motion" && !manual.has("data_sheet"))
           all.push_back({.scenario = &scenario, .manual = &manual, .variant = {.invert = true}});

@@ -14,7 +14,7 @@ struct Part {
 
 /// Every scenario on every model on CAN and every data sheet of a maker that is there, motion also inverted,
 /// one after the other on the interface vcan0, in the time of a guest (tests/guest/run.sh -v). Prints a line
-/// for each. `named`: only scenarios whose name has this in it. True: there were some, and all passed.
+/// for each. `named`: only those with this in "MODEL SCENARIO". True: there were some, and all passed.
 bool run_vcan_suite(const Programs& programs, std::string_view named);
 
 /// Every scenario, in so many parts: those of motion and stop on each model, the others on one of them in
