@@ -1,5 +1,6 @@
 #include <iostream>
 
+#include "api/tls/library.hpp"
 #include "config/budget.hpp"
 #include "config/configuration.hpp"
 #include "daemon/daemon.hpp"
@@ -7,6 +8,7 @@
 #include "daemon/state_copier.hpp"
 
 int main(int argc, char** argv) {
+  axisd::tls::keep_library_for_threads();
   const auto options = axisd::parse_options(argc, argv);
   if (options.schema) {
     std::cout << axisd::config::json_schema() << '\n';

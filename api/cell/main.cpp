@@ -24,6 +24,7 @@
 #include "api/exposition/http_server.hpp"
 #include "api/program/program.hpp"
 #include "api/tls/digest.hpp"
+#include "api/tls/library.hpp"
 #include "buses/asio_clock.hpp"
 #include "buses/limited_log.hpp"
 
@@ -174,6 +175,7 @@ int serve(const Settings& settings, const std::string& machine_id_file, Certific
 }  // namespace
 
 int main(int argc, char** argv) {
+  tls::keep_library_for_threads();
   const auto options = parse_options(argc, argv);
   const auto loaded = load_settings(options.config);
   for (const auto& diagnostic : loaded.diagnostics) std::cerr << to_string(diagnostic) << '\n';

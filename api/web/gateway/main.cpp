@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "api/program/program.hpp"
+#include "api/tls/library.hpp"
 #include "api/transport/channel.hpp"
 #include "api/web/gateway/gateway.hpp"
 #include "api/web/gateway/listener.hpp"
@@ -153,6 +154,7 @@ int serve(const Settings& settings, Ground ground) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  tls::keep_library_for_threads();
   const auto options = parse_options(argc, argv);
   const auto loaded = load_settings(options.config);
   for (const auto& diagnostic : loaded.diagnostics) std::cerr << to_string(diagnostic) << '\n';
