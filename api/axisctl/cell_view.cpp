@@ -60,16 +60,16 @@ std::string trouble_of(const v1::ErrorDetail& error, bool given, std::string_vie
   return given ? describe(error) : std::string(otherwise);
 }
 
+/// By etcd alone: an entrance without it asks a machine no more than whether it is there.
+bool is_known_inside(const cell::v1::Machine& machine) {
+  return machine.axes_size() > 0 || !machine.configuration_revision().empty();
+}
+
 }  // namespace
 
 void update(Machines& machines, const cell::v1::WatchMachinesResponse& change) {
   for (const auto& machine : change.machines()) machines[machine.name()] = machine;
   for (const auto& name : change.forgotten()) machines.erase(name);
-}
-
-/// By etcd alone: an entrance without it asks a machine no more than whether it is there.
-bool is_known_inside(const cell::v1::Machine& machine) {
-  return machine.axes_size() > 0 || !machine.configuration_revision().empty();
 }
 
 bool answers(const cell::v1::Machine& machine) {

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "api/transport/listen.hpp"
+#include "tests/support/stream_socket.hpp"
 #include "tests/unit/api/serving.hpp"
 
 namespace axisd::testing {
@@ -39,7 +40,7 @@ class Acceptance : public ::testing::Test {
   }
 
   [[nodiscard]] FileDescriptor client() const {
-    FileDescriptor ours(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
+    auto ours = test::stream_socket();
     const sockaddr_in address{.sin_family = AF_INET,
                               .sin_port = htons(static_cast<std::uint16_t>(port_)),
                               .sin_addr = {htonl(INADDR_LOOPBACK)},
@@ -62,9 +63,12 @@ class Acceptance : public ::testing::Test {
   }
   /// What gRPC finds to read on one of them, bytes; that of one which was cut off is gone.
   [[nodiscard]] ssize_t left_on(std::size_t which) {
-    const std::lock_guard lock(mutex_);
+    const int connection = [&] {
+      const std::lock_guard lock(mutex_);
+      return taken_.at(which).get();
+    }();
     std::string all(200'000, ' ');
-    return ::recv(taken_.at(which).get(), all.data(), all.size(), MSG_PEEK | MSG_DONTWAIT);
+    return ::recv(connection, all.data(), all.size(), MSG_PEEK | MSG_DONTWAIT);
   }
 
   /// Whatever has happened on the connections by now is known to the loop.

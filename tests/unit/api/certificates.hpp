@@ -41,7 +41,9 @@ class Certificates {
   /// from now on.
   void revoke(const std::string& ca, const std::vector<std::string>& names, const std::string& times = "") {
     const auto base = directory_ / ca;
-    std::ofstream(base + ".index", std::ios::app);
+    {
+      const std::ofstream at_least_empty(base + ".index", std::ios::app);
+    }
     std::ofstream(base + ".cnf") << "[ca]\ndefault_ca = own\n[own]\ndatabase = " << base
                                  << ".index\ndefault_md = sha256\ndefault_crl_days = 2\n";
     const auto of_ca =

@@ -18,6 +18,7 @@
 
 #include "api/transport/listen.hpp"
 #include "api/transport/peer_socket.hpp"
+#include "tests/support/stream_socket.hpp"
 
 namespace axisd::testing {
 namespace {
@@ -37,7 +38,7 @@ struct Ends {
 
 /// The kernel counts what comes on it.
 std::pair<FileDescriptor, FileDescriptor> on_tcp() {
-  const FileDescriptor listening(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
+  const auto listening = test::stream_socket();
   sockaddr_in address{
       .sin_family = AF_INET, .sin_port = 0, .sin_addr = {htonl(INADDR_LOOPBACK)}, .sin_zero = {}};
   socklen_t size = sizeof address;
@@ -45,7 +46,7 @@ std::pair<FileDescriptor, FileDescriptor> on_tcp() {
   EXPECT_EQ(::bind(listening.get(), any, size), 0);
   EXPECT_EQ(::listen(listening.get(), 1), 0);
   EXPECT_EQ(::getsockname(listening.get(), any, &size), 0);
-  FileDescriptor ours(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
+  auto ours = test::stream_socket();
   EXPECT_EQ(::connect(ours.get(), any, size), 0);
   FileDescriptor theirs(::accept4(listening.get(), nullptr, nullptr, SOCK_CLOEXEC));
   return {std::move(ours), std::move(theirs)};

@@ -17,6 +17,7 @@
 #include "axisd/v1/stop_service.grpc.pb.h"
 #include "buses/file_descriptor.hpp"
 #include "tests/support/source_tree.hpp"
+#include "tests/support/stream_socket.hpp"
 #include "tests/unit/api/certificates.hpp"
 #include "tests/unit/api/serving.hpp"
 
@@ -24,7 +25,6 @@ namespace axisd::testing {
 namespace {
 
 using namespace std::chrono_literals;
-using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
 class Lane : public ::testing::Test {
@@ -52,7 +52,7 @@ class Lane : public ::testing::Test {
   }
   /// A connection that says nothing.
   FileDescriptor silent() const {
-    FileDescriptor fd(socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
+    auto fd = test::stream_socket();
     sockaddr_in address{.sin_family = AF_INET, .sin_port = htons(static_cast<std::uint16_t>(port_))};
     address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
     EXPECT_EQ(::connect(fd.get(), reinterpret_cast<sockaddr*>(&address), sizeof address), 0);
@@ -71,8 +71,9 @@ TEST_F(Lane, EveryCallReachesTheMachine) {
   auto stub = client();
   const auto call = [&]<class Request, class Response>(grpc::Status (v1::StopService::Stub::*method)(
                                                            grpc::ClientContext*, const Request&, Response*),
-                                                       Request request) {
+                                                       const Request& asked) {
     Call context;
+    auto request = asked;
     if constexpr (requires { request.set_axis("feeder"); }) request.set_axis("feeder");
     Response response;
     const auto status = (stub.get()->*method)(&context, request, &response);

@@ -10,6 +10,7 @@
 #include "api/transport/stream_budget.hpp"
 #include "api/transport/stream_counts.hpp"
 #include "axisd/v1/event_service.grpc.pb.h"
+#include "tests/support/stream_socket.hpp"
 #include "tests/unit/api/serving.hpp"
 
 namespace axisd::testing {
@@ -39,7 +40,7 @@ class Leaver {
  public:
   /// `own`: the address that it comes from; nullptr: any.
   Leaver(const sockaddr* address, socklen_t size, const sockaddr* own = nullptr)
-      : socket_(::socket(address->sa_family, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
+      : socket_(test::stream_socket(address->sa_family)) {
     const int on = 1;
     if (own != nullptr) {
       setsockopt(socket_.get(), SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);

@@ -14,6 +14,7 @@
 
 #include "api/server/callers.hpp"
 #include "buses/file_descriptor.hpp"
+#include "tests/support/stream_socket.hpp"
 #include "tests/unit/api/certificates.hpp"
 #include "tests/unit/api/serving.hpp"
 
@@ -121,8 +122,10 @@ TEST_F(Transport, SurvivesRunningOutOfDescriptors) {
   address.sin_family = AF_INET;
   address.sin_port = htons(static_cast<std::uint16_t>(*port));
   address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  constexpr int crowd = 8;
   std::vector<FileDescriptor> clients;
-  for (int i = 0; i < 8; ++i) clients.emplace_back(socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
+  clients.reserve(crowd);
+  for (int i = 0; i < crowd; ++i) clients.emplace_back(test::stream_socket());
 
   const int lowest_free = dup(0);
   close(lowest_free);
@@ -138,7 +141,7 @@ TEST_F(Transport, SurvivesRunningOutOfDescriptors) {
     if (recv(client.get(), &byte, 1, 0) <= 0) ++turned_away;
   }
   ASSERT_EQ(setrlimit(RLIMIT_NOFILE, &before), 0);
-  EXPECT_EQ(turned_away, 8);
+  EXPECT_EQ(turned_away, crowd);
   clients.clear();
   EXPECT_TRUE(stop(connect("127.0.0.1:" + std::to_string(*port))).first.ok());
 }
@@ -156,7 +159,7 @@ TEST_F(Transport, ConnectionsAreBounded) {
                                    transport::PeerBudgets::hello);
   bool turned_away = false;
   for (int i = 0; i < 200 && !turned_away; ++i) {
-    auto& client = clients.emplace_back(socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
+    auto& client = clients.emplace_back(test::stream_socket());
     ASSERT_EQ(connect(client.get(), reinterpret_cast<sockaddr*>(&address), sizeof address), 0);
     (void)send(client.get(), hello.data(), hello.size(), MSG_NOSIGNAL);
     char byte = 0;
@@ -179,7 +182,7 @@ TEST_F(Transport, SilentConnectionsMakeRoom) {
   ASSERT_TRUE(stop(before).first.ok());
   std::vector<FileDescriptor> crowd;
   for (int i = 0; i < 100; ++i) {
-    auto& client = crowd.emplace_back(socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
+    auto& client = crowd.emplace_back(test::stream_socket());
     ASSERT_EQ(connect(client.get(), reinterpret_cast<sockaddr*>(&address), sizeof address), 0);
   }
   EXPECT_TRUE(stop(connect("127.0.0.1:" + std::to_string(*port))).first.ok()) << "whoever comes behind them";
@@ -197,7 +200,7 @@ TEST_F(Transport, AFloodOfRequestsThatAreTakenBackIsCutOff) {
   address.sin_family = AF_INET;
   address.sin_port = htons(static_cast<std::uint16_t>(*port));
   address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  const FileDescriptor flood(socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
+  const auto flood = test::stream_socket();
   ASSERT_EQ(::connect(flood.get(), reinterpret_cast<sockaddr*>(&address), sizeof address), 0);
   const auto frame = [](char kind, char flags, std::uint32_t stream, std::string_view payload) {
     std::string bytes{0, 0, static_cast<char>(payload.size()), kind, flags};

@@ -12,6 +12,8 @@
 #include <string>
 #include <vector>
 
+#include "tests/support/stream_socket.hpp"
+
 namespace axisd::metrics {
 namespace {
 
@@ -39,7 +41,7 @@ class HttpServerTest : public testing::Test {
     server_ = *std::move(opened);
   }
   [[nodiscard]] FileDescriptor connected() const {
-    FileDescriptor socket(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
+    auto socket = test::stream_socket();
     sockaddr_in to{};
     to.sin_family = AF_INET;
     to.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
