@@ -53,31 +53,38 @@ Task<QuiesceReport> stop_one(Executor executor, Clock& clock, std::string axis, 
   Rest rest(drive.position_window());
   report.detail = "the port did not open";
   std::optional<TimePoint> first;  // stop that was acknowledged
+  TimePoint acked{};               // the last one was
+  bool rests = false;              // by the last reading, since a stop was acknowledged
   while (clock.now() < times.end) {
     if (!bus.port().open) {
       if (bus.port().error) report.detail = to_string(*bus.port().error);
       co_await bus.port_changed().wait_until(std::min(times.end, clock.now() + retry));
       continue;
     }
-    const auto kind = clock.now() < times.harder ? StopKind::stop : StopKind::quick_stop;
-    const auto sent = co_await drive.stop(kind);
-    const auto acked = clock.now();
-    if (sent) {
-      first = first.value_or(acked);
-      const auto state = co_await drive.read_state(TransactionClass::moving_state);
-      // What the daemon started right before it ended may begin yet, whatever was acknowledged (M13).
-      const bool may_begin = state && state->asked_at < *first + start_window;
-      if (state && state->asked_at >= acked && rest.confirms(*state) && !may_begin) {
-        report.confirmed = true;
-        report.detail = "standstill confirmed";
-        co_return report;
+    if (!rests) {
+      const auto kind = clock.now() < times.harder ? StopKind::stop : StopKind::quick_stop;
+      const auto sent = co_await drive.stop(kind);
+      acked = clock.now();
+      if (!sent) {
+        report.detail = to_string(sent.error());
+        co_await sleep_until(executor, clock, std::min(times.end, acked + retry));
+        continue;
       }
-      report.detail = !state          ? to_string(state.error())
-                      : state->moving ? "still moving"
-                                      : "not at rest for long enough";
-    } else {
-      report.detail = to_string(sent.error());
+      first = first.value_or(acked);
     }
+    const auto state = co_await drive.read_state(TransactionClass::moving_state);
+    // What the daemon started right before it ended may begin yet, whatever was acknowledged (M13).
+    const bool may_begin = state && state->asked_at < *first + start_window;
+    if (state && state->asked_at >= acked && rest.confirms(*state) && !may_begin) {
+      report.confirmed = true;
+      report.detail = "standstill confirmed";
+      co_return report;
+    }
+    // It is stopped again only if it moves, or does not say.
+    rests = state && !state->moving;
+    report.detail = !state          ? to_string(state.error())
+                    : state->moving ? "still moving"
+                                    : "not at rest for long enough";
     co_await sleep_until(executor, clock, std::min(times.end, clock.now() + retry));
   }
   co_return report;

@@ -152,13 +152,17 @@ TEST(M16, EndlessOnlyWithoutPositionLimits) {
   });
 }
 
-core::QuiesceReport quiesce(Rig& rig, Duration limit) {
+/// `writes`: how many frames it sent that write.
+core::QuiesceReport quiesce(Rig& rig, Duration limit, int* writes = nullptr) {
   rig.stop_daemon();
   std::optional<std::vector<core::QuiesceReport>> reports;
-  auto make_line = [&rig](const modbus_rtu::LineSettings& settings) {
+  auto make_line = [&rig, writes](const modbus_rtu::LineSettings& settings) {
     EXPECT_EQ(settings.echo_witness, rig.configuration.axes.front().axis.node);
     auto made = std::make_unique<VirtualLine>(rig.world, settings);
     rig.line = made.get();
+    made->set_on_bind([writes](const WireEntry& entry) {
+      if (writes != nullptr && entry.is_write()) ++*writes;
+    });
     made->network().advance(rig.world.now());
     made->network().add(std::make_unique<BorrowedNode>(*rig.drive));
     return std::unique_ptr<modbus_rtu::Line>(std::move(made));
@@ -188,6 +192,19 @@ TEST(M17, QuiesceStopsWhatMoves) {
       EXPECT_FALSE(rig.drive->shaft_moving());
     }
   });
+}
+
+/// What was started right before the daemon ended may begin yet: it is waited for, with the line free for
+/// others.
+TEST(M17, QuiesceStopsOnceWhatRests) {
+  Rig rig;
+  rig.ready();
+  int writes = 0;
+  const auto begin = rig.world.now();
+  const auto report = quiesce(rig, 3s, &writes);
+  EXPECT_TRUE(report.confirmed) << report.detail;
+  EXPECT_EQ(writes, 1);
+  EXPECT_GE(rig.world.now() - begin, 500ms);
 }
 
 TEST(M17, QuiesceReportsWhatItCouldNotStop) {
