@@ -61,8 +61,9 @@ class Cell {
   /// Whether the axisd beside this entrance says that the caller is a maintainer.
   void release_stop_all(const Caller& caller,
                         std::function<void(const grpc::Status&, const v1::ReleaseStopAllResponse&)> done);
-  void move_group(const Caller& caller, const v1::MoveGroupRequest& request, GroupMoves::Answer answer) {
-    group_moves_.move(caller, request, std::move(answer));
+  void move_group(const Caller& caller, const v1::MoveGroupRequest& request, TimePoint start_by,
+                  GroupMoves::Answer answer) {
+    group_moves_.move(caller, request, start_by, std::move(answer));
   }
   [[nodiscard]] v1::ExchangeStopAllResponse exchange(const v1::ExchangeStopAllRequest& request) {
     return stop_all_.exchange(request);

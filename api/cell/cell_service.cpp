@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "api/cell/status.hpp"
+#include "api/transport/patience.hpp"
 #include "config/text.hpp"
 
 namespace axisd::cell {
@@ -130,10 +131,14 @@ grpc::ServerUnaryReactor* CellServiceImpl::ReleaseStopAll(grpc::CallbackServerCo
 grpc::ServerUnaryReactor* CellServiceImpl::MoveGroup(grpc::CallbackServerContext* context,
                                                      const v1::MoveGroupRequest* request,
                                                      v1::MoveGroupResponse* response) {
+  const auto patience = transport::patience_of(*context);
+  const auto start_by = patience ? monotonic_now() + *patience : TimePoint::max();
   return serve<v1::MoveGroupRequest, v1::MoveGroupResponse>(
       context, request, response,
-      [this](const Caller& caller, const v1::MoveGroupRequest& asked,
-             const Answer<v1::MoveGroupResponse>& answer) { cell_.move_group(caller, asked, answer); });
+      [this, start_by](const Caller& caller, const v1::MoveGroupRequest& asked,
+                       const Answer<v1::MoveGroupResponse>& answer) {
+        cell_.move_group(caller, asked, start_by, answer);
+      });
 }
 
 grpc::ServerWriteReactor<v1::WatchEventsResponse>* CellServiceImpl::WatchEvents(

@@ -31,8 +31,8 @@ bool was_told(const axisd::v1::GroupMove& move) {
   return move.state() == axisd::v1::COMMAND_STATE_ACTIVE || move.preparation().has_starts_at();
 }
 
-GroupMoveMachine::GroupMoveMachine(std::vector<std::string> machines, Duration clock_tolerance)
-    : clock_tolerance_(clock_tolerance) {
+GroupMoveMachine::GroupMoveMachine(std::vector<std::string> machines, const Limits& limits)
+    : limits_(limits) {
   for (auto& name : machines) parts_.push_back({.machine = std::move(name)});
 }
 
@@ -138,12 +138,13 @@ GroupMoveMachine::Errands GroupMoveMachine::measured(std::size_t machine, const 
     return errands;
   }
   const auto error = clock.at(answer.received)->error;
-  if (error > clock_tolerance_)
+  if (error > limits_.clock_tolerance)
     return give_up(
-        detail_of(axisd::v1::REASON_OUT_OF_RANGE,
-                  fmt::format("{}: its clock is known to {} only, {} are allowed (clock_tolerance)",
-                              parts_[machine].machine, milliseconds(error), milliseconds(clock_tolerance_)),
-                  "allow more, or look at the network between the machines and at their load"),
+        detail_of(
+            axisd::v1::REASON_OUT_OF_RANGE,
+            fmt::format("{}: its clock is known to {} only, {} are allowed (clock_tolerance)",
+                        parts_[machine].machine, milliseconds(error), milliseconds(limits_.clock_tolerance)),
+            "allow more, or look at the network between the machines and at their load"),
         grpc::StatusCode::OUT_OF_RANGE, answer.received);
   const bool all_known =
       std::ranges::all_of(parts_, [](const Part& part) { return part.clock.count() >= round_trips; });
@@ -155,6 +156,13 @@ GroupMoveMachine::Errands GroupMoveMachine::choose_moment(TimePoint now) {
   Duration notice{};
   for (const auto& part : parts_) notice = std::max(notice, duration_of(part.move.preparation().notice()));
   const auto moment = now + notice + lead;
+  if (moment > limits_.start_by)
+    return give_up(
+        detail_of(axisd::v1::REASON_EXPIRED,
+                  "the caller does not wait until all could start together, so nothing was started",
+                  "give the call a longer deadline; if it is often so, look at the machine that "
+                  "takes longest to prepare"),
+        grpc::StatusCode::DEADLINE_EXCEEDED, now);
   Errands errands;
   for (std::size_t i = 0; i < parts_.size(); ++i) {
     const auto at = (moment + parts_[i].clock.at(now)->offset).time_since_epoch();
@@ -228,10 +236,16 @@ GroupMoveMachine::Errands GroupMoveMachine::looked(std::size_t machine, const An
   if (state_ == State::giving_up) return take_while_giving_up(machine, answer);
   if (state_ != State::attached || is_out(part)) return {};
   if (answer.status.ok()) {
+    part.silent_since.reset();
     take(part, answer.move);
   } else {
-    part.error = detail_of(answer.status);
-    part.stage = Part::Stage::lost;
+    auto error = detail_of(answer.status);
+    if (!part.silent_since) part.silent_since = answer.sent;
+    if (error.reason() == axisd::v1::REASON_UNKNOWN_COMMAND ||
+        answer.received - *part.silent_since >= longest_silence) {
+      part.error = std::move(error);
+      part.stage = Part::Stage::lost;
+    }
   }
   end_if_over();
   return {};

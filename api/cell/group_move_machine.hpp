@@ -29,7 +29,8 @@ namespace axisd::cell {
 ///   running ----- all are done ----------------------> over
 ///   attached ---- all have ended, or cannot be asked > over
 ///   preparing, measuring, telling, running
-///            ---- one refuses, fails, ends or is lost, or it is too late --> giving_up
+///            ---- one refuses, fails, ends or is lost, or it is too late,
+///                 for a machine or for the caller -----------------------> giving_up
 ///   giving_up --- all have ended, or no longer answer --------------------> over
 ///   any but over
 ///            ---- another entrance has told one, for the same request -----> attached
@@ -78,8 +79,14 @@ class GroupMoveMachine {
   /// So long it is looked at what became of machines that were stopped.
   static constexpr Duration longest_end = std::chrono::seconds(5);
 
-  /// `clock_tolerance`: a clock has to be known better than this.
-  GroupMoveMachine(std::vector<std::string> machines, Duration clock_tolerance);
+  /// So long a machine may be silent that is only looked at.
+  static constexpr Duration longest_silence = std::chrono::seconds(3);
+
+  struct Limits {
+    Duration clock_tolerance;               ///< a clock has to be known better than this
+    TimePoint start_by = TimePoint::max();  ///< until then the caller waits: nobody starts later (M31)
+  };
+  GroupMoveMachine(std::vector<std::string> machines, const Limits& limits);
 
   [[nodiscard]] Errands begin();
   [[nodiscard]] Errands prepared(std::size_t machine, const Answer& answer);
@@ -123,7 +130,8 @@ class GroupMoveMachine {
     axisd::v1::GroupMove move{};
     std::optional<axisd::v1::ErrorDetail> error{};
     ClockSamples clock{};
-    TimePoint next{};  ///< when it is to be asked again
+    TimePoint next{};                         ///< when it is to be asked again
+    std::optional<TimePoint> silent_since{};  ///< while it is only looked at
     bool stopping = false;
   };
 
@@ -155,7 +163,7 @@ class GroupMoveMachine {
   void fill_skew(v1::CellGroupMove& to) const;
 
   State state_ = State::preparing;
-  const Duration clock_tolerance_;
+  const Limits limits_;
   std::vector<Part> parts_;
   std::optional<axisd::v1::ErrorDetail> cause_;
   grpc::Status refusal_;  ///< why this entrance would not go on

@@ -105,6 +105,7 @@ struct GroupMoves::Run {
   v1::MoveGroupRequest request;  ///< empty once it is over
   int targets;
   Metadata metadata;
+  TimePoint start_by;       ///< so long its caller waits
   std::vector<Way> ways{};  ///< of each machine, as they were at the beginning
   GroupMoveMachine machine;
   struct Waiter {
@@ -180,7 +181,8 @@ GroupMoves::RunPtr GroupMoves::find(const Caller& caller, const std::string& req
   return found == runs_.end() ? nullptr : *found;
 }
 
-void GroupMoves::move(const Caller& caller, const v1::MoveGroupRequest& request, Answer answer) {
+void GroupMoves::move(const Caller& caller, const v1::MoveGroupRequest& request, TimePoint start_by,
+                      Answer answer) {
   if (const auto valid = check(caller, request); !valid.ok()) return answer(valid, {});
   const auto until = request.options().wait_until();
   auto digest = digest_of(request);
@@ -193,13 +195,15 @@ void GroupMoves::move(const Caller& caller, const v1::MoveGroupRequest& request,
     return settle(known);
   }
   if (const auto room = check_room(caller); !room.ok()) return answer(room, {});
-  auto run = std::make_shared<Run>(Run{.caller = caller,
-                                       .request_id = request.options().request_id(),
-                                       .digest = std::move(digest),
-                                       .request = request,
-                                       .targets = targets_of(request),
-                                       .metadata = *Callers::metadata_for(caller),
-                                       .machine = {names_of(request), tolerance_of(request)}});
+  auto run = std::make_shared<Run>(
+      Run{.caller = caller,
+          .request_id = request.options().request_id(),
+          .digest = std::move(digest),
+          .request = request,
+          .targets = targets_of(request),
+          .metadata = *Callers::metadata_for(caller),
+          .start_by = start_by,
+          .machine = {names_of(request), {.clock_tolerance = tolerance_of(request), .start_by = start_by}}});
   if (const auto connected = connect(*run); !connected.ok()) return answer(connected, {});
   run->waiters.push_back({.until = until, .answer = std::move(answer)});
   runs_.push_back(run);
@@ -323,11 +327,13 @@ void GroupMoves::prepare(const RunPtr& run, std::size_t machine) {
   options = run->request.options();
   options.clear_wait_until();
   options.set_lease_token(part.lease_token());
+  const auto left = std::max<Duration>(run->start_by - clock_.now(), std::chrono::milliseconds(1));
   using Response = axisd::v1::PrepareMoveResponse;
-  ask<Response>(
-      core_, run->ways[machine].main,
-      {.path = "/axisd.v1.GroupService/PrepareMove", .timeout = prepare_patience, .metadata = run->metadata},
-      request, taker<Response>(run, machine, &GroupMoveMachine::prepared));
+  ask<Response>(core_, run->ways[machine].main,
+                {.path = "/axisd.v1.GroupService/PrepareMove",
+                 .timeout = std::min(prepare_patience, left),
+                 .metadata = run->metadata},
+                request, taker<Response>(run, machine, &GroupMoveMachine::prepared));
 }
 
 void GroupMoves::tell(const RunPtr& run, std::size_t machine, Duration at) {

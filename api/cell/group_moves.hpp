@@ -27,9 +27,9 @@ class GroupMoves {
       : core_(std::move(core)), clock_(clock), routes_(routes) {}
 
   using Answer = std::function<void(const grpc::Status&, const v1::MoveGroupResponse&)>;
-  /// Begins a move, or attaches to the one of that request_id. `answer`: once it has come as far as the
-  /// request says, or was refused.
-  void move(const Caller& caller, const v1::MoveGroupRequest& request, Answer answer);
+  /// Begins a move, or attaches to the one of that request_id. `start_by`: the caller waits no longer, so
+  /// that nobody starts later. `answer`: once it has come as far as the request says, or was refused.
+  void move(const Caller& caller, const v1::MoveGroupRequest& request, TimePoint start_by, Answer answer);
   /// Nobody is renewed any more, so that all stop by themselves; whoever waits is told `why`, or that the
   /// move may have run in part.
   void end(const grpc::Status& why);

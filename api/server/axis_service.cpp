@@ -9,13 +9,13 @@
 #include "api/server/command_reply.hpp"
 #include "api/server/convert.hpp"
 #include "api/server/hold_validate.hpp"
-#include "api/server/peer.hpp"
 #include "api/server/pending_call.hpp"
 #include "api/server/reply_stream.hpp"
 #include "api/server/status.hpp"
 #include "api/server/stop_requests.hpp"
 #include "api/server/value_reply.hpp"
 #include "api/server/watch_hub.hpp"
+#include "api/transport/patience.hpp"
 #include "buses/limited_log.hpp"
 
 namespace axisd::server {
@@ -51,7 +51,7 @@ AxisServiceImpl::Reactor* AxisServiceImpl::move(Context* context, const Request&
   auto submission = motion_options(request.options(), client, services_.machine);
   if (!submission) return refuse(context, client, what, submission.error());
   submission->options.origin = caller.origin;
-  if (const auto patience = patience_of(*context))
+  if (const auto patience = transport::patience_of(*context))
     submission->options.call_deadline = services_.machine.now() + *patience;
   auto ticket = services_.admission.admit(client, Admission::Kind::motion);
   if (!ticket) return refuse(context, client, what, ticket.error());

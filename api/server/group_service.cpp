@@ -11,12 +11,12 @@
 #include "api/server/convert.hpp"
 #include "api/server/group_convert.hpp"
 #include "api/server/hold_validate.hpp"
-#include "api/server/peer.hpp"
 #include "api/server/pending_call.hpp"
 #include "api/server/status.hpp"
 #include "api/server/stop_requests.hpp"
 #include "api/server/validate.hpp"
 #include "api/server/value_reply.hpp"
+#include "api/transport/patience.hpp"
 #include "buses/limited_log.hpp"
 
 namespace axisd::server {
@@ -60,7 +60,7 @@ GroupServiceImpl::Reactor* GroupServiceImpl::move(Context* context, Result<Group
   auto submission = motion_options(options, client, services_.machine);
   if (!submission) return answer(context, to_status(submission.error()));
   submission->options.origin = caller.origin;
-  if (const auto patience = patience_of(*context))
+  if (const auto patience = transport::patience_of(*context))
     submission->options.call_deadline = services_.machine.now() + *patience;
   auto ticket = services_.admission.admit(client, Admission::Kind::motion);
   if (!ticket) return answer(context, to_status(ticket.error()));

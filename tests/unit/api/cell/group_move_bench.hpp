@@ -33,8 +33,8 @@ inline grpc::Status refusal(axisd::v1::Reason reason = axisd::v1::REASON_SOFT_LI
 /// Machines press-1, press-2 ..., whose clocks are an hour, two hours ... ahead.
 class Bench {
  public:
-  explicit Bench(std::size_t machines = 3, Duration tolerance = 1ms)
-      : count(machines), move(names(machines), tolerance) {
+  explicit Bench(std::size_t machines = 3, GroupMoveMachine::Limits limits = {.clock_tolerance = 1ms})
+      : count(machines), move(names(machines), limits) {
     wire = move.begin();
   }
 

@@ -44,11 +44,33 @@ TEST(GroupMoveMachine, WhatAnotherEntranceDoesAtAMachineThatIsLostIsNotKnown) {
     bench.add(bench.move.prepared(i, bench.answer(i, COMMAND_STATE_ACTIVE)));
   ASSERT_EQ(bench.move.state(), State::attached);
   bench.end(0, COMMAND_STATE_DONE);
-  bench.add(bench.move.looked(1, bench.failure({grpc::StatusCode::UNAVAILABLE, "no route"})));
   bench.end(2, COMMAND_STATE_DONE);
+  const auto no_route = [&] {
+    bench.add(bench.move.looked(1, bench.failure({grpc::StatusCode::UNAVAILABLE, "no route"})));
+  };
+  no_route();
+  bench.pass(GroupMoveMachine::longest_silence - 1ms);
+  no_route();
+  EXPECT_EQ(bench.move.state(), State::attached);
+  bench.add(bench.move.looked(1, bench.answer(1, COMMAND_STATE_ACTIVE)));
+  bench.pass(GroupMoveMachine::longest_silence);
+  no_route();
+  EXPECT_EQ(bench.move.state(), State::attached) << "it has answered since";
+  bench.pass(GroupMoveMachine::longest_silence);
+  no_route();
   EXPECT_EQ(bench.move.state(), State::over);
   EXPECT_EQ(bench.move.value().state(), COMMAND_STATE_UNKNOWN);
   EXPECT_THAT(bench.asked(Kind::cancel), IsEmpty());
+}
+
+TEST(GroupMoveMachine, AMachineThatIsSilentForAWhileTellsWhatAnotherEntranceDid) {
+  Bench bench;
+  bench.take(Kind::prepare);
+  for (std::size_t i = 0; i < 3; ++i)
+    bench.add(bench.move.prepared(i, bench.answer(i, COMMAND_STATE_ACTIVE)));
+  bench.add(bench.move.looked(1, bench.failure({grpc::StatusCode::DEADLINE_EXCEEDED, "busy"})));
+  for (std::size_t i = 0; i < 3; ++i) bench.end(i, COMMAND_STATE_DONE);
+  EXPECT_EQ(bench.move.value().state(), COMMAND_STATE_DONE);
 }
 
 TEST(GroupMoveMachine, ARequestThatHasEndedIsToldAsItEnded) {

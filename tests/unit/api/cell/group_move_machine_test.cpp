@@ -158,7 +158,7 @@ TEST(GroupMoveMachine, WhoDoesNotKnowTheMoveAnyMoreHasEnded) {
 }
 
 TEST(GroupMoveMachine, AClockThatIsNotKnownWellEnoughIsRefused) {
-  Bench bench(2, 50us);
+  Bench bench(2, {.clock_tolerance = 50us});
   bench.trip = 300us;
   bench.run_up_to(State::telling);
   EXPECT_EQ(bench.move.state(), State::giving_up);
@@ -176,6 +176,22 @@ TEST(GroupMoveMachine, WhoIsPreparedTooLateForTheOthersStartsNobody) {
   EXPECT_EQ(bench.move.value().cause().reason(), axisd::v1::REASON_EXPIRED);
   bench.release_waiting({0, 1, 2});
   EXPECT_EQ(bench.move.state(), State::over);
+}
+
+TEST(GroupMoveMachine, NobodyStartsWhenTheCallerNoLongerWaits) {
+  Bench bench(3, {.clock_tolerance = 1ms, .start_by = TimePoint(100s + 300ms)});
+  bench.run_up_to(State::telling);
+  EXPECT_EQ(bench.move.state(), State::giving_up);
+  EXPECT_EQ(bench.move.value().cause().reason(), axisd::v1::REASON_EXPIRED);
+  bench.release_waiting({0, 1, 2});
+  EXPECT_EQ(bench.move.state(), State::over);
+  EXPECT_EQ(bench.move.refusal().error_code(), grpc::StatusCode::DEADLINE_EXCEEDED);
+
+  Bench patient(3, {.clock_tolerance = 1ms, .start_by = TimePoint(100s + 600ms)});
+  patient.run_up_to(State::telling);
+  EXPECT_EQ(patient.move.state(), State::telling);
+  for (const auto& tell : patient.take(Kind::tell))
+    EXPECT_LE(tell.at - patient.offset(tell.machine), 100s + 600ms);
 }
 
 /// Its preparation is nearly over: it takes no moment any more, and ends by itself.

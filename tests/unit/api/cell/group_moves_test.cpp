@@ -85,10 +85,11 @@ class GroupMovesTest : public ::testing::Test {
   }
   void ask(const Caller& caller = {.name = "local", .local = true}) {
     answer_.reset();
-    moves_.move(caller, request_, [this](const grpc::Status& status, const v1::MoveGroupResponse& response) {
-      answer_ = status;
-      move_ = response.move();
-    });
+    moves_.move(caller, request_, TimePoint::max(),
+                [this](const grpc::Status& status, const v1::MoveGroupResponse& response) {
+                  answer_ = status;
+                  move_ = response.move();
+                });
   }
   void expect_refused(StatusCode code, const std::string& text,
                       const Caller& caller = {.name = "local", .local = true}) {
