@@ -13,7 +13,7 @@ import time
 import grpc
 
 from client import package
-from harness import LIMIT, Client, Program, Scenario, run, spinner, wait_for
+from harness import LIMIT, Client, Program, Scenario, own_host, run, spinner, wait_for
 from harness.client import CallFailed, error_pb, event_pb
 from harness.notify import NotifySocket
 
@@ -42,12 +42,6 @@ from axisd.cell.v1 import cell_service_pb2 as cell_pb, cell_service_pb2_grpc  # 
 PRESENT, SILENT = cell_pb.MACHINE_STATE_PRESENT, cell_pb.MACHINE_STATE_SILENT
 UNREGISTERED, GONE = cell_pb.MACHINE_STATE_UNREGISTERED, cell_pb.MACHINE_STATE_GONE
 OK, DEGRADED = cell_pb.REGISTRY_STATE_OK, cell_pb.REGISTRY_STATE_DEGRADED
-
-
-def own_host():
-    """A loopback address that no other process of this computer takes: so ports are free without being searched for."""
-    number = os.getpid()
-    return f"127.{64 + (number >> 16) % 64}.{(number >> 8) & 255}.{number & 255 or 1}"
 
 
 HOST = own_host()

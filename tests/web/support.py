@@ -393,6 +393,7 @@ class WebScenario(Scenario):
                 finger.press, again = str(uuid.uuid4()), time.monotonic() + 3
             return False
         wait_for(turns, "the shaft turns")
+        finger.starts = self.subject.sim.shaft().starts
         return finger
 
     def was_halted(self, client=OWN_NAME):

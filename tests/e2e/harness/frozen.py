@@ -17,16 +17,30 @@ def _ptrace(request, thread):
         raise OSError(code, os.strerror(code), f"thread {thread}")
 
 
+def _named(pid, name):
+    """Of those that do not end meanwhile."""
+    for task in pathlib.Path(f"/proc/{pid}/task").iterdir():
+        with contextlib.suppress(FileNotFoundError, ProcessLookupError):
+            if (task / "comm").read_text().strip() == name:
+                yield int(task.name)
+
+
+def _freeze(thread, thawing):
+    """False: it has ended."""
+    try:
+        _ptrace(PTRACE_SEIZE, thread)
+    except ProcessLookupError:
+        return False
+    thawing.callback(_ptrace, PTRACE_DETACH, thread)
+    _ptrace(PTRACE_INTERRUPT, thread)
+    os.waitpid(thread, WALL)
+    return True
+
+
 @contextlib.contextmanager
 def frozen(pid, name):
     """Freezes the threads of that name (as the kernel knows it) until the end of the block."""
-    threads = [int(task.name) for task in pathlib.Path(f"/proc/{pid}/task").iterdir()
-               if (task / "comm").read_text().strip() == name]
-    assert threads, f"{name}: no such thread"
     with contextlib.ExitStack() as thawing:
-        for thread in threads:
-            _ptrace(PTRACE_SEIZE, thread)
-            thawing.callback(_ptrace, PTRACE_DETACH, thread)
-            _ptrace(PTRACE_INTERRUPT, thread)
-            os.waitpid(thread, WALL)
+        frozen_threads = [thread for thread in _named(pid, name) if _freeze(thread, thawing)]
+        assert frozen_threads, f"{name}: no such thread"
         yield

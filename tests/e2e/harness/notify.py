@@ -27,7 +27,7 @@ class NotifySocket:
             at = time.monotonic_ns()
             for line in message.decode().splitlines():
                 self._received.append(line)
-                for listener in self._listeners if line != "FORGOTTEN" else ():
+                for listener in self._listeners if line != "MARK" else ():
                     listener(at, line)
 
     def listen(self, listener):
@@ -40,15 +40,21 @@ class NotifySocket:
 
     def forget(self):
         """All that was sent up to now, also what has not been read yet."""
-        with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as mark:
-            mark.sendto(b"FORGOTTEN", self.path)
-        wait_for(lambda: "FORGOTTEN" in self._received, "the messages up to now")
+        self._read_up_to_now()
         self._received.clear()
+
+    def _read_up_to_now(self):
+        with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as mark:
+            mark.sendto(b"MARK", self.path)
+        wait_for(lambda: "MARK" in self._received, "the messages up to now")
+        self._received.remove("MARK")
 
     def wait_for(self, message, while_running):
         """Until the message has come; an error once the program has ended without it."""
         def seen():
             alive = while_running.running()
+            if not alive:
+                self._read_up_to_now()
             if message in self.received():
                 return True
             if not alive:

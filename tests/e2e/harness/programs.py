@@ -22,6 +22,12 @@ class Hung(AssertionError):
     """A condition did not come true."""
 
 
+def own_host():
+    """A loopback address that no other process of this computer takes: so ports are free without being searched for."""
+    number = os.getpid()
+    return f"127.{64 + (number >> 16) % 64}.{(number >> 8) & 255}.{number & 255 or 1}"
+
+
 def wait_for(condition, what, limit=LIMIT):
     """Returns the first true value of condition()."""
     deadline = time.monotonic() + limit
