@@ -22,6 +22,11 @@ TransactionClass lowest_class(bool held) {
   return held ? TransactionClass::moving_state : TransactionClass::scan;
 }
 
+Unanswered unanswered(const Transaction& ended) {
+  if (ended.transaction_class != TransactionClass::stop) return Unanswered::request;
+  return ended.patient ? Unanswered::owed_stop : Unanswered::stop;
+}
+
 /// State twice, canary, block and trigger, and a reading of another axis between them, where all answer at
 /// once: 169 characters and twelve silences.
 Duration usual_start(const LineSettings& settings) {
@@ -365,7 +370,7 @@ void RtuBus::note_silence(const Transaction& ended, const ExchangeResult& result
       if (ended.transaction_class == TransactionClass::scan || ended.exchange.serial) break;
       quarantine_.silent(node, clock_->now(),
                          result.reply_end - result.request_begin + silence(settings_.serial()),
-                         ended.transaction_class == TransactionClass::stop && !ended.patient);
+                         unanswered(ended));
       break;
     case ExchangeStatus::replied:
     case ExchangeStatus::corrupt:  // somebody is there

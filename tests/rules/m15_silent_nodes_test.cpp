@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <map>
 
+#include "buses/modbus_rtu/quarantine.hpp"
 #include "buses/modbus_rtu/settings.hpp"
 #include "tests/rules/shared_line.hpp"
 #include "tests/support/rig.hpp"
@@ -127,16 +128,60 @@ TEST(M15, RepeatedStopsToSilentNodesCostLittle) {
   const auto frame = modbus_rtu::wire_time(modbus_rtu::SerialSettings{.baud = 115200}, first->request.size());
   EXPECT_EQ(line.machine().find("a16")->observed().stop_frame, first->begin + frame - asked)
       << "answered or not";
-  Duration in_vain{};
-  int stops = 0;
-  for (const auto& entry : wire) {
-    if (entry.node() == 16) in_vain += entry.end - entry.begin + 1750us;
-    stops += entry.node() == 16 && entry.address() == 0x0028 ? 1 : 0;
-  }
-  EXPECT_GE(stops, 5) << "it stays owed";
-  EXPECT_LE(in_vain, 20'000ms * 2 / 100);
+  const auto cost = [&wire] {
+    Duration in_vain{};
+    int stops = 0;
+    for (const auto& entry : wire) {
+      if (entry.node() == 16) in_vain += entry.end - entry.begin + 1750us;
+      stops += entry.node() == 16 && entry.address() == 0x0028 ? 1 : 0;
+    }
+    EXPECT_GE(stops, 5) << "it stays owed";
+    return in_vain;
+  };
+  EXPECT_LE(cost(), 20'000ms / modbus_rtu::quarantine_owed_share) << "its motor may be turning";
+  line.world.run_for(15s);
+  line.line->forget_wire();
+  line.world.run_for(20s);
+  EXPECT_LE(cost(), 20'000ms * 2 / 100) << "it does not come back";
   line.line->network().faults().clear();
   ASSERT_TRUE(line.world.run_until([&] { return !line.line->network().node(16)->shaft_moving(); }, 5s));
+}
+
+/// A motor that turned when its node fell silent is stopped soon after it is there again, however long it was
+/// away; and the others are read as published all that time.
+TEST(M15, AStopThatIsOwedComesSoonAndCostsTheOthersNoMoreThanPublished) {
+  for (const int baud : {115200, 19200})
+    for (auto silence = 1000ms; silence < 8s; silence = silence * 3 / 2) {
+      SCOPED_TRACE(testing::Message() << baud << " Bd, silent for " << silence.count() << " ms");
+      SharedLine line(8, baud);
+      ASSERT_TRUE(line.world.run_until(
+          [&] { return line.all([](const AxisSnapshot& axis) { return axis.link == LinkState::online; }); },
+          20s));
+      for (int axis = 1; axis <= 8; ++axis) {
+        const auto enabled = line.submit(axis, EnableRequest{});
+        ASSERT_TRUE(line.world.run_until([&] { return enabled->has_ended(); }, 5s));
+        line.submit(axis, MoveVelocityRequest{.velocity = 20});
+      }
+      line.world.run_for(1s);
+      line.line->network().faults().add(
+          {.kind = simulation::FaultKind::drop_request, .node = 8, .count = -1});
+      line.world.run_for(silence);
+      line.line->network().faults().clear();
+      line.line->forget_wire();
+      const auto back = line.world.now();
+      const auto answered = [&] {
+        return std::ranges::find_if(line.line->wire(), [](const WireEntry& entry) {
+          return entry.node() == 8 && entry.address() == 0x0028 &&
+                 entry.status == modbus_rtu::ExchangeStatus::replied;
+        });
+      };
+      ASSERT_TRUE(line.world.run_until([&] { return answered() != line.line->wire().end(); }, 5s));
+      EXPECT_LE(answered()->begin - back, 500ms);
+      line.world.run_for(1s);
+      const auto report = line.machine().budgets().at(0);
+      for (const auto& axis : report.axes)
+        EXPECT_LE(axis.observed.refresh_moving, axis.predicted.refresh_moving_all) << axis.predicted.axis;
+    }
 }
 
 /// A stop that is asked for while an earlier one's frame waits in vain gets a frame of its own.

@@ -13,7 +13,7 @@ constexpr TimePoint start{10s};
 
 /// Probes `node` in vain whenever it may be asked, until `end`; returns what that took of the line's time.
 Duration probe(Quarantine& quarantine, std::initializer_list<std::uint8_t> nodes, TimePoint from,
-               TimePoint end, Duration cost) {
+               TimePoint end, Duration cost, Unanswered what = Unanswered::request) {
   Duration sum{};
   for (auto now = from; now < end;) {
     auto next = end;
@@ -21,7 +21,7 @@ Duration probe(Quarantine& quarantine, std::initializer_list<std::uint8_t> nodes
       if (quarantine.ready_at(node) <= now) {
         now += cost;
         sum += cost;
-        quarantine.silent(node, now, cost, false);
+        quarantine.silent(node, now, cost, what);
       }
       next = std::min(next, quarantine.ready_at(node));
     }
@@ -42,7 +42,7 @@ double share(std::initializer_list<std::uint8_t> nodes, Duration cost) {
 TEST(Quarantine, OneRequestInVainIsEnoughForANodeThatNeverAnswered) {
   Quarantine quarantine;
   EXPECT_EQ(quarantine.ready_at(one), TimePoint{});
-  quarantine.silent(one, start, short_wait, false);
+  quarantine.silent(one, start, short_wait, Unanswered::request);
   EXPECT_EQ(quarantine.ready_at(one), start + quarantine_first_hold);
   EXPECT_TRUE(quarantine.nodes().at(one).quarantined());
   EXPECT_EQ(quarantine.ready_at(two), TimePoint{}) << "others are not concerned";
@@ -52,15 +52,15 @@ TEST(Quarantine, ANodeThatAnsweredMayFailTwice) {
   Quarantine quarantine;
   quarantine.answered(one);
   for (int i = 1; i < quarantine_after; ++i) {
-    quarantine.silent(one, start, short_wait, false);
+    quarantine.silent(one, start, short_wait, Unanswered::request);
     EXPECT_FALSE(quarantine.nodes().at(one).quarantined());
   }
-  quarantine.silent(one, start, short_wait, false);
+  quarantine.silent(one, start, short_wait, Unanswered::request);
   EXPECT_TRUE(quarantine.nodes().at(one).quarantined());
   EXPECT_EQ(quarantine.nodes().at(one).entered, 1U);
   EXPECT_EQ(quarantine.nodes().at(one).since, start);
   EXPECT_EQ(quarantine.nodes().at(one).probes, 0U);
-  quarantine.silent(one, start + 1s, short_wait, false);
+  quarantine.silent(one, start + 1s, short_wait, Unanswered::request);
   EXPECT_EQ(quarantine.nodes().at(one).entered, 1U);
   EXPECT_EQ(quarantine.nodes().at(one).since, start);
   EXPECT_EQ(quarantine.nodes().at(one).probes, 1U);
@@ -71,7 +71,7 @@ TEST(Quarantine, WaitsDoubleUpToTheShare) {
   auto now = start;
   std::vector<Duration> waits;
   for (int i = 0; i < 7; ++i) {
-    quarantine.silent(one, now, short_wait, false);
+    quarantine.silent(one, now, short_wait, Unanswered::request);
     waits.push_back(quarantine.ready_at(one) - now);
     now = quarantine.ready_at(one);
   }
@@ -85,17 +85,17 @@ TEST(Quarantine, AReplyEndsTheWaitAndFourOfThemTheSuspicion) {
   quarantine.answered(one);
   EXPECT_EQ(quarantine.ready_at(one), TimePoint{});
   EXPECT_FALSE(quarantine.nodes().at(one).quarantined());
-  quarantine.silent(one, start + 20s, short_wait, false);
+  quarantine.silent(one, start + 20s, short_wait, Unanswered::request);
   EXPECT_EQ(quarantine.ready_at(one), start + 20s + 2 * quarantine_first_hold)
       << "suspected, but not for long";
   for (int i = 0; i < quarantine_trust_after; ++i) quarantine.answered(one);
-  quarantine.silent(one, start + 30s, short_wait, false);
+  quarantine.silent(one, start + 30s, short_wait, Unanswered::request);
   EXPECT_EQ(quarantine.ready_at(one), TimePoint{}) << "trusted: one failure is none";
 }
 
 TEST(Quarantine, StopsAloneDoNotPutANodeThere) {
   Quarantine quarantine;
-  for (int i = 0; i < 10; ++i) quarantine.silent(one, start, short_wait, true);
+  for (int i = 0; i < 10; ++i) quarantine.silent(one, start, short_wait, Unanswered::stop);
   EXPECT_EQ(quarantine.ready_at(one), TimePoint{});
 }
 
@@ -104,9 +104,9 @@ TEST(Quarantine, AStopInVainPutsTheNextProbeOffOnceOnly) {
   probe(quarantine, {one}, start, start + 10s, short_wait);
   const auto hold = quarantine_share * short_wait;
   const auto now = start + 20s;
-  quarantine.silent(one, now, short_wait, true);
+  quarantine.silent(one, now, short_wait, Unanswered::stop);
   EXPECT_EQ(quarantine.ready_at(one), now + hold);
-  for (int i = 0; i < 20; ++i) quarantine.silent(one, now, short_wait, true);
+  for (int i = 0; i < 20; ++i) quarantine.silent(one, now, short_wait, Unanswered::stop);
   EXPECT_EQ(quarantine.ready_at(one), now + 2 * hold) << "a node that is back is not to wait for all of them";
 }
 
@@ -116,6 +116,39 @@ TEST(Quarantine, EachCostsTwoPercentOfTheLine) {
   EXPECT_GE(share({one}, short_wait), 0.018) << "they are probed all the same";
 }
 
+/// It may be turning its motor, and gets its stop as soon as it is there again.
+TEST(Quarantine, ANodeThatIsOwedAStopIsProbedMoreOftenForAWhile) {
+  Quarantine quarantine;
+  probe(quarantine, {one}, start, start + 10s, short_wait, Unanswered::owed_stop);
+  auto now = quarantine.ready_at(one);
+  quarantine.silent(one, now, short_wait, Unanswered::owed_stop);
+  EXPECT_EQ(quarantine.ready_at(one), now + quarantine_owed_share * short_wait);
+  now = start + quarantine_owed_time + short_wait;
+  quarantine.silent(one, now, short_wait, Unanswered::owed_stop);
+  EXPECT_EQ(quarantine.ready_at(one), now + quarantine_share * short_wait) << "it is gone for good";
+  quarantine.answered(one);
+  now += 10s;
+  for (int i = 0; i < 6; ++i) quarantine.silent(one, now, short_wait, Unanswered::owed_stop);
+  EXPECT_EQ(quarantine.ready_at(one), now + 2 * quarantine_owed_share * short_wait) << "it was there since";
+}
+
+TEST(Quarantine, NodesThatAreOwedAStopShareWhatTheyMayCost) {
+  /// Once the waits have grown.
+  const auto part = [](std::initializer_list<std::uint8_t> nodes, Duration cost) {
+    Quarantine quarantine;
+    const auto settled = start + 10s, end = start + quarantine_owed_time;
+    probe(quarantine, nodes, start, settled, cost, Unanswered::owed_stop);
+    const auto sum = probe(quarantine, nodes, settled, end, cost, Unanswered::owed_stop);
+    return static_cast<double>(sum.count()) / static_cast<double>((end - settled).count());
+  };
+  for (const auto cost : {short_wait, long_wait}) {
+    EXPECT_LE(part({one}, cost), 1.0 / quarantine_owed_share) << cost.count();
+    EXPECT_LE(part({one, two, three}, cost), 0.13) << cost.count() << ": few long waits, in a row";
+    EXPECT_GE(part({one, two, three}, cost), 0.08) << cost.count();
+  }
+  EXPECT_LE(share({one}, short_wait), 0.02) << "others cost as little as ever";
+}
+
 /// Where a wait for a silent node takes long (turnaround_max 200 ms).
 TEST(Quarantine, SlowNodesAreProbedMoreOftenAsLongAsTheLineCanBearIt) {
   EXPECT_LE(share({one}, long_wait), 0.04);
@@ -123,17 +156,17 @@ TEST(Quarantine, SlowNodesAreProbedMoreOftenAsLongAsTheLineCanBearIt) {
   EXPECT_LE(share({one, two, three}, long_wait), 0.06) << "several share it";
   Quarantine quarantine;
   probe(quarantine, {one}, start, start + 60s, long_wait);
-  quarantine.silent(one, start + 100s, long_wait, false);
+  quarantine.silent(one, start + 100s, long_wait, Unanswered::request);
   EXPECT_EQ(quarantine.ready_at(one), start + 100s + quarantine_common_share * long_wait);
   Quarantine cheap;
   probe(cheap, {one}, start, start + 60s, 60ms);
-  cheap.silent(one, start + 100s, 60ms, false);
+  cheap.silent(one, start + 100s, 60ms, Unanswered::request);
   EXPECT_EQ(cheap.ready_at(one), start + 100s + quarantine_longest_hold);
 }
 
 TEST(Quarantine, ForgetsAllWithThePort) {
   Quarantine quarantine;
-  quarantine.silent(one, start, short_wait, false);
+  quarantine.silent(one, start, short_wait, Unanswered::request);
   quarantine.forget();
   EXPECT_EQ(quarantine.ready_at(one), TimePoint{});
   EXPECT_FALSE(quarantine.nodes().at(one).quarantined());
