@@ -168,6 +168,9 @@ bool Axis::held_back(const Plan& plan) const {
 /// something to tell the line is left to others.
 void Axis::expect_end(const Plan& plan, std::int64_t base, TimePoint since) {
   pace_.came();
+  // Of a way that its position does not tell only a reading in motion does: else its end is waited for long.
+  if (!plan.endless && !shows(plan, base))
+    return poll_fast(since, std::max(plan.predicted, start_window) + end_window);
   if (!plan.endless) {
     const auto soonest = planner_.soonest(plan, plan.target->counter - base);
     const auto lead = std::min(soonest / end_lead_share, longest_end_lead);

@@ -1,12 +1,14 @@
 #include "devices/axis/motion_machine.hpp"
 
+#include <algorithm>
+
 namespace axisd {
 
 namespace {
 
 /// Beyond the predicted time: the prediction is exact for the profile, the drive's own latency is unknown.
 constexpr Duration overrun_margin = std::chrono::seconds(1);
-/// A motion that no sample can tell from noise is over so long after its predicted end.
+/// A motion that no sample can tell from noise is over so long after its predicted end, if it began at once.
 constexpr Duration unseen_margin = std::chrono::milliseconds(100);
 
 }  // namespace
@@ -28,8 +30,8 @@ MotionMachine::State MotionMachine::look(const Reading& reading) {
     rests_since_.reset();  // what rested before it began says nothing of its settling
   }
   // Its motion was acknowledged, and may have begun and ended between two samples.
-  const bool unseen_end = motion_.unseen && !reading.held_back &&
-                          reading.asked_at >= motion_.since + motion_.predicted + unseen_margin;
+  const auto unseen_until = motion_.since + std::max(motion_.predicted + unseen_margin, start_window);
+  const bool unseen_end = motion_.unseen && !reading.held_back && reading.asked_at >= unseen_until;
   if (state_ == State::starting && unseen_end) state_ = State::running;
   if (!reading.positioning) return state_ = State::taken_over;
   if (reading.moving) {

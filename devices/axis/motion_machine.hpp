@@ -15,7 +15,8 @@ inline constexpr Duration start_window = std::chrono::milliseconds(500);
 /// and nothing older. Pure. Thread: core.
 ///
 ///   starting -- moves, or is elsewhere than it was ------------------------> running
-///   starting -- its way is too short to be seen, and its time is over -----> running
+///   starting -- its way is too short to be seen, and its time is over,
+///               and so is the start window: a drive may begin late ---------> running
 ///   starting -- rests, by a reading from after the start window -----------> did_not_start
 ///   running  -- at rest elsewhere than at the target ----------------------> settling
 ///   running, settling -- at rest at the target ----------------------------> arrived

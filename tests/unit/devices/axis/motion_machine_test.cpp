@@ -102,6 +102,20 @@ TEST(MotionMachine, AMotionThatNoReadingCanShowHasBegunWhenItsTimeIsOver) {
   EXPECT_EQ(followed.rests(predicted + 100ms, {.at_target = true}), State::arrived);
 }
 
+/// Some drives begin late, and a way within the window looks the same before and after.
+TEST(MotionMachine, AMotionThatNoReadingCanShowMayBeginUntilTheStartWindowIsOver) {
+  auto unseen = motion();
+  unseen.unseen = true;
+  unseen.predicted = 20ms;
+  const MotionMachine::Reading there{.at_target = true};
+  Followed late(unseen), seen(unseen);
+  EXPECT_EQ(late.rests(120ms, there), State::starting);
+  EXPECT_EQ(late.rests(start_window - 1ms, there), State::starting);
+  EXPECT_EQ(late.rests(start_window, there), State::arrived);
+  EXPECT_EQ(seen.machine.look({.asked_at = started + 10ms, .moving = true}), State::running);
+  EXPECT_EQ(seen.rests(20ms, there), State::arrived) << "nothing else can come";
+}
+
 TEST(MotionMachine, AMotionThatNoReadingCanShowHasNotBegunWhereATerminalHoldsItBack) {
   auto unseen = motion();
   unseen.unseen = true;
