@@ -393,6 +393,8 @@ class Axis {
   /// itself takes for in position.
   [[nodiscard]] std::int64_t target_tolerance() const;
   [[nodiscard]] bool is_at(const PositionTracker::Target& target) const;
+  /// There, or beside it by no more than a measured position may waver (M30).
+  [[nodiscard]] bool is_near(const PositionTracker::Target& target) const;
   /// The shaft is elsewhere than it was at `counter`: further than a measurement wavers.
   [[nodiscard]] bool moved_from(std::int64_t counter) const;
   Task<Result<DriveSample>> sample_after(TimePoint since, Duration patience);

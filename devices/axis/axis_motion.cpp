@@ -206,6 +206,10 @@ bool Axis::is_at(const PositionTracker::Target& target) const {
   return std::abs(tracker_.counter() - target.counter) <= target_tolerance();
 }
 
+bool Axis::is_near(const PositionTracker::Target& target) const {
+  return std::abs(tracker_.counter() - target.counter) <= target_tolerance() + drive_->position_window() / 2;
+}
+
 Duration Axis::settling() const {
   return drive_->position_window() > 0 ? Duration(milliseconds(300)) : Duration{};
 }

@@ -21,6 +21,7 @@ TimePoint MotionMachine::latest() const {
 void MotionMachine::go_on() {
   if (state_ == State::arrived) state_ = State::running;
   rests_since_.reset();
+  there_since_.reset();
 }
 
 MotionMachine::State MotionMachine::look(const Reading& reading) {
@@ -37,6 +38,7 @@ MotionMachine::State MotionMachine::look(const Reading& reading) {
   if (reading.moving) {
     if (reading.astray) return state_ = State::astray;
     rests_since_.reset();
+    there_since_.reset();
     if (state_ == State::settling) state_ = State::running;
   } else {
     state_ = judge_rest(reading);
@@ -50,11 +52,18 @@ MotionMachine::State MotionMachine::look(const Reading& reading) {
 }
 
 MotionMachine::State MotionMachine::judge_rest(const Reading& reading) {
-  const bool begun = state_ != State::starting;
-  // Before it moved it may rest within the tolerance, too.
-  if (reading.at_target && begun) return State::arrived;
   if (!rests_since_) rests_since_ = reading.asked_at;
-  if (!begun) return State::starting;
+  // Before it moved it may rest within the tolerance, too.
+  if (state_ == State::starting) return State::starting;
+  if (reading.at_target) {
+    if (!there_since_) there_since_ = reading.asked_at;
+    const bool seen_unsettled = state_ == State::settling;
+    const bool settled = reading.in_position && !seen_unsettled;
+    if (settled || reading.asked_at - *there_since_ >= still) return State::arrived;
+    rests_since_ = reading.asked_at;
+    return State::settling;
+  }
+  if (!reading.near_target) there_since_.reset();
   const bool settles = !reading.held_back && reading.asked_at - *rests_since_ < motion_.settling;
   return settles ? State::settling : State::rests_elsewhere;
 }

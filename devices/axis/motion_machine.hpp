@@ -18,10 +18,12 @@ inline constexpr Duration start_window = std::chrono::milliseconds(500);
 ///   starting -- its way is too short to be seen, and its time is over,
 ///               and so is the start window: a drive may begin late ---------> running
 ///   starting -- rests, by a reading from after the start window -----------> did_not_start
-///   running  -- at rest elsewhere than at the target ----------------------> settling
-///   running, settling -- at rest at the target ----------------------------> arrived
+///   running  -- at rest at the target, and in position as its drive says --> arrived
+///   running  -- at rest otherwise -----------------------------------------> settling
+///   settling -- at rest at the target, and never far from it for `still` --> arrived
 ///   settling -- moves -----------------------------------------------------> running
-///   running, settling -- held back, or longer than a shaft settles --------> rests_elsewhere
+///   running, settling -- elsewhere: held back, or for longer than a shaft
+///                        settles since it rests or was seen at its target -> rests_elsewhere
 ///   arrived  -- go_on(): something has moved it since ---------------------> running
 ///   starting, running, settling -- another mode of the drive --------------> taken_over
 ///   any of these -- moves away from its target -----------------------------> astray
@@ -31,7 +33,7 @@ class MotionMachine {
   enum class State : std::uint8_t {
     starting,  ///< acknowledged, and not seen yet
     running,
-    settling,  ///< at rest, and not at its target
+    settling,  ///< at rest, and not at its target, or not for long enough
     arrived,
     // It has ended otherwise:
     rests_elsewhere,
@@ -51,11 +53,16 @@ class MotionMachine {
     TimePoint asked_at{};
     bool positioning = true;  ///< the mode of the drive
     bool moving = false;
-    bool elsewhere = false;  ///< than where it started
-    bool at_target = false;  ///< of a motion that has one
-    bool held_back = false;  ///< by a limit or a stop terminal
-    bool astray = false;     ///< further from where it started, or from its target, than this motion goes
+    bool elsewhere = false;    ///< than where it started
+    bool at_target = false;    ///< of a motion that has one
+    bool near_target = false;  ///< or beside it by no more than a reading may waver
+    bool in_position = false;  ///< its drive says so, or counts its position: one reading is enough
+    bool held_back = false;    ///< by a limit or a stop terminal
+    bool astray = false;       ///< further from where it started, or from its target, than this motion goes
   };
+
+  /// A shaft that rings about its target crosses it: so long it is to be read there before it has settled.
+  static constexpr Duration still = std::chrono::milliseconds(20);
 
   explicit MotionMachine(const Motion& motion) : motion_(motion) {}
 
@@ -72,8 +79,10 @@ class MotionMachine {
 
   Motion motion_;
   State state_ = State::starting;
-  /// At rest since this reading, whether it has begun or not.
+  /// At rest since this reading, whether it has begun or not; or last seen at its target then.
   std::optional<TimePoint> rests_since_;
+  /// At rest at its target by this reading, and near it by all since.
+  std::optional<TimePoint> there_since_;
 };
 
 /// What became of a start whose trigger was sent and got no reply that says so (M8). Pure. Thread: core.

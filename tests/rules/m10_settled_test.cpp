@@ -1,7 +1,10 @@
-// M10: Done where a measured position alone says little: a way within the window.
+// M10: Done where a measured position alone says little: a way within the window, and a shaft that rings.
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <cstdlib>
 #include <memory>
+#include <numbers>
 #include <optional>
 #include <vector>
 
@@ -80,6 +83,55 @@ TEST(M10, AMoveWithinTheWindowIsNotDoneBeforeALateDriveHasMadeIt) {
         EXPECT_FALSE(rig.drive->shaft_moving()) << "Done, and moving";
         EXPECT_LE(rig.world.now() - from, 700ms);
       }
+}
+
+/// The encoder passes the target again and again, and each time the drive is in position for a moment.
+TEST(M10, AShaftThatRingsIsNotDoneWhereItCrossesItsTarget) {
+  constexpr double counts = 150, fades_within = 0.150, longest_period = 0.100;
+  for (const auto model : closed_loops)
+    for (double period = 0.017; period < longest_period; period *= 1.3) {
+      SCOPED_TRACE(testing::Message() << model << ", period " << period << " s");
+      Rig rig(measured(model));
+      rig.ready();
+      const auto move = rig.submit(MoveAbsoluteRequest{.position = 20});
+      ASSERT_TRUE(rig.run_until([&] { return rig.drive->shaft_moving(); }, 1s));
+      ASSERT_TRUE(rig.drive->lean_on_shaft(static_cast<int>(counts)));
+      ASSERT_TRUE(rig.run_until([&] { return !rig.drive->shaft_moving(); }, 5s));
+      const auto ended = rig.world.now();
+      double amplitude = counts;
+      while (!move->has_ended()) {
+        const auto since = std::chrono::duration<double>(rig.world.now() - ended).count();
+        ASSERT_LT(since, 2);
+        amplitude = counts * std::exp(-since / fades_within);
+        const auto ring = amplitude * std::cos(2 * std::numbers::pi * since / period);
+        rig.line->network().advance(rig.world.now());
+        ASSERT_TRUE(rig.drive->lean_on_shaft(static_cast<int>(std::lround(ring))));
+        rig.run(500us);
+      }
+      EXPECT_EQ(move->value().state, CommandState::done) << describe(move->value());
+      EXPECT_LE(amplitude, 25) << "counts by which it may be off, and the window is 10";
+    }
+}
+
+/// A load keeps it there, and the encoder wavers.
+TEST(M10, AShaftThatRestsAtTheEdgeOfItsWindowIsDone) {
+  for (const auto model : closed_loops)
+    for (int counts = 6; counts <= 10; ++counts) {
+      SCOPED_TRACE(testing::Message() << model << ", off by " << counts << " counts");
+      auto options = measured(model);
+      options.adjust_drive = [usual = options.adjust_drive](simulation::SimulatedNodeSettings& node) {
+        usual(node);
+        node.encoder.noise = 2;
+        node.encoder.following = 20ms;
+      };
+      Rig rig(options);
+      rig.ready();
+      const auto move = rig.submit(MoveAbsoluteRequest{.position = 20});
+      ASSERT_TRUE(rig.run_until([&] { return rig.drive->shaft_moving(); }, 1s));
+      ASSERT_TRUE(rig.drive->lean_on_shaft(-counts));
+      ASSERT_TRUE(rig.run_until([&] { return move->has_ended(); }, 5s));
+      EXPECT_EQ(move->value().state, CommandState::done) << describe(move->value());
+    }
 }
 
 }  // namespace

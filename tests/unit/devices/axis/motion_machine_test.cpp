@@ -24,7 +24,9 @@ struct Followed {
     reading.asked_at = started + at;
     return machine.look(reading);
   }
-  State arrives(Duration at) { return rests(at, {.elsewhere = true, .at_target = true}); }
+  State arrives(Duration at) {
+    return rests(at, {.elsewhere = true, .at_target = true, .in_position = true});
+  }
 
   MotionMachine machine;
 };
@@ -62,7 +64,62 @@ TEST(MotionMachine, ItSettlesBeforeItArrives) {
   followed.moves(10ms);
   EXPECT_EQ(followed.rests(20ms), State::settling);
   EXPECT_EQ(followed.rests(20ms + settling - 1ms), State::settling);
-  EXPECT_EQ(followed.arrives(20ms + settling), State::arrived);
+  EXPECT_EQ(followed.arrives(20ms + settling), State::settling);
+  EXPECT_EQ(followed.arrives(20ms + settling + MotionMachine::still), State::arrived);
+}
+
+/// It crosses its target, and is in position as its drive says at that moment.
+TEST(MotionMachine, AShaftThatRingsHasNotArrived) {
+  Followed followed;
+  followed.moves(10ms);
+  EXPECT_EQ(followed.rests(20ms), State::settling);
+  for (auto at = 30ms; at < 600ms; at += 30ms) {
+    EXPECT_EQ(followed.arrives(at), State::settling) << at.count();
+    EXPECT_EQ(followed.arrives(at + MotionMachine::still - 1ms), State::settling) << at.count();
+    EXPECT_EQ(followed.rests(at + MotionMachine::still), State::settling) << at.count();
+  }
+  EXPECT_EQ(followed.arrives(610ms), State::settling);
+  EXPECT_EQ(followed.arrives(620ms), State::settling);
+  EXPECT_EQ(followed.arrives(630ms), State::arrived);
+}
+
+TEST(MotionMachine, WhereItsDriveDoesNotSayThatItIsInPositionItIsReadThereForAWhile) {
+  Followed followed;
+  const MotionMachine::Reading there{.elsewhere = true, .at_target = true};
+  followed.moves(10ms);
+  EXPECT_EQ(followed.rests(20ms, there), State::settling);
+  EXPECT_EQ(followed.rests(39ms, there), State::settling);
+  EXPECT_EQ(followed.rests(40ms, there), State::arrived);
+}
+
+TEST(MotionMachine, WhatWaversAtTheEdgeOfItsWindowHasArrived) {
+  Followed followed;
+  const MotionMachine::Reading beside{.elsewhere = true, .near_target = true};
+  followed.moves(10ms);
+  EXPECT_EQ(followed.rests(20ms, beside), State::settling);
+  EXPECT_EQ(followed.arrives(30ms), State::settling);
+  EXPECT_EQ(followed.rests(40ms, beside), State::settling);
+  EXPECT_EQ(followed.rests(50ms, beside), State::settling) << "it is not there";
+  EXPECT_EQ(followed.arrives(60ms), State::arrived);
+}
+
+TEST(MotionMachine, AMotionInBetweenBreaksItsRestAtTheTarget) {
+  Followed followed;
+  followed.moves(10ms);
+  followed.rests(20ms);
+  EXPECT_EQ(followed.arrives(30ms), State::settling);
+  EXPECT_EQ(followed.moves(40ms), State::running);
+  EXPECT_EQ(followed.rests(50ms), State::settling);
+  EXPECT_EQ(followed.arrives(60ms), State::settling);
+}
+
+TEST(MotionMachine, AShaftThatLeavesItsTargetForLongerThanItSettlesRestsElsewhere) {
+  Followed followed;
+  followed.moves(10ms);
+  followed.rests(20ms);
+  EXPECT_EQ(followed.arrives(300ms), State::settling);
+  EXPECT_EQ(followed.rests(300ms + settling - 1ms), State::settling);
+  EXPECT_EQ(followed.rests(300ms + settling), State::rests_elsewhere);
 }
 
 TEST(MotionMachine, AMotionBetweenTwoRestsSettlesAnew) {
@@ -99,7 +156,7 @@ TEST(MotionMachine, AMotionThatNoReadingCanShowHasBegunWhenItsTimeIsOver) {
   Followed followed(unseen);
   EXPECT_EQ(followed.rests(10ms, {.at_target = true}), State::starting);
   EXPECT_EQ(followed.rests(predicted + 99ms, {.at_target = true}), State::starting);
-  EXPECT_EQ(followed.rests(predicted + 100ms, {.at_target = true}), State::arrived);
+  EXPECT_EQ(followed.rests(predicted + 100ms, {.at_target = true, .in_position = true}), State::arrived);
 }
 
 /// Some drives begin late, and a way within the window looks the same before and after.
@@ -107,7 +164,7 @@ TEST(MotionMachine, AMotionThatNoReadingCanShowMayBeginUntilTheStartWindowIsOver
   auto unseen = motion();
   unseen.unseen = true;
   unseen.predicted = 20ms;
-  const MotionMachine::Reading there{.at_target = true};
+  const MotionMachine::Reading there{.at_target = true, .in_position = true};
   Followed late(unseen), seen(unseen);
   EXPECT_EQ(late.rests(120ms, there), State::starting);
   EXPECT_EQ(late.rests(start_window - 1ms, there), State::starting);
@@ -174,7 +231,8 @@ TEST(MotionMachine, WhatMovedAfterItHadArrivedIsFollowedOn) {
   followed.machine.go_on();
   EXPECT_EQ(followed.machine.state(), State::running);
   EXPECT_EQ(followed.rests(400ms), State::settling);
-  EXPECT_EQ(followed.arrives(600ms), State::arrived);
+  EXPECT_EQ(followed.arrives(600ms), State::settling);
+  EXPECT_EQ(followed.arrives(620ms), State::arrived);
 }
 
 using Readback = StartReadback::State;
