@@ -240,7 +240,10 @@ Plan Planner::aimed(Plan plan, const PositionTracker::Target& target, const Posi
   plan.target = target;
   plan.positive = positive(target, tracker);
   plan.granted.position = scale_->to_units(target.counter + tracker.offset());
-  plan.granted.distance = *plan.granted.position - tracker.position();  // of an absolute move, too
+  // Of an absolute move, too; and from where the drive was told to stand: what a reading wavers is no part of
+  // it.
+  plan.granted.distance =
+      *plan.granted.position - scale_->to_units(tracker.resting_counter() + tracker.offset());
   plan.predicted = duration(plan, target.counter - tracker.counter());
   return plan;
 }

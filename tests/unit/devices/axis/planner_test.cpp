@@ -53,6 +53,23 @@ TEST(Planner, GrantsWhatIsSentInCoarseCounts) {
   EXPECT_DOUBLE_EQ(CoarseDrive({}).granted_rpm(99), 99);
 }
 
+/// Whoever adds up what was granted ends where the axis stands.
+TEST(Planner, WhatIsGrantedIsNoneOfWhatAReadingWavers) {
+  const CoarseDrive drive({});
+  PositionTracker tracker(Scale({.pulses_per_revolution = 1000, .unit = "rev"}));
+  tracker.update(0);
+  const auto one = tracker.plan_absolute(1);
+  tracker.update(1004, 10);
+  tracker.reached(one, 10);
+  tracker.update(997, 10);
+  for (const auto& target : {tracker.plan_relative(0.5), tracker.plan_absolute(1.5)})
+    EXPECT_DOUBLE_EQ(*drive.planner().aimed(drive.profile(100), target, tracker).granted.distance, 0.5);
+  tracker.forget_base();
+  EXPECT_DOUBLE_EQ(
+      *drive.planner().aimed(drive.profile(100), tracker.plan_absolute(1.5), tracker).granted.distance, 0.503)
+      << "it stands where it is read";
+}
+
 TEST(Planner, CountsOfPulsesAreFinerTheMoreARevolutionHas) {
   const CoarseDrive pulses({.rpm = 60'000, .of_pulse = true});  // 60 r/min with 1000
   EXPECT_DOUBLE_EQ(pulses.granted_rpm(119), 60);
