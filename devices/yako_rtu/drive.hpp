@@ -154,7 +154,8 @@ class YakoRtuDrive final : public Drive {
   [[nodiscard]] std::string serial_advice(const SerialChange& change) const;
 
   [[nodiscard]] std::unexpected<Error> failed(Error error) const;
-  [[nodiscard]] Error lost_memory() const;
+  /// `found`: in place of the canary.
+  [[nodiscard]] Error lost_memory(const MotionBlock& found) const;
   [[nodiscard]] Error not_held(const RegisterSetting& setting, std::uint16_t actual) const;
   [[nodiscard]] Error error_at(Reason reason, std::uint16_t address, std::string message,
                                std::string remedy) const;

@@ -36,9 +36,16 @@ void YakoRtuDrive::forget_power_cycle(const MotionBlock& block) {
   unsaved_.clear();
 }
 
-Error YakoRtuDrive::lost_memory() const {
-  return error_at(Reason::rebooted, reg::start_speed, "the drive lost its memory: it was switched off and on",
-                  "enable the axis again, then home it; nothing resumes by itself");
+Error YakoRtuDrive::lost_memory(const MotionBlock& found) const {
+  const std::string remedy = "enable the axis again, then home it; nothing resumes by itself";
+  if (canary_.is_left_by_power_up(found))
+    return error_at(Reason::rebooted, reg::start_speed,
+                    "the drive lost its memory: it was switched off and on", remedy);
+  return error_at(
+      Reason::rebooted, reg::start_speed,
+      "the drive does not hold the motion parameters that were written last: another master wrote "
+      "them, or it was switched off and on",
+      "check for other masters on the bus, and the drive's supply; " + remedy);
 }
 
 MotionBlock YakoRtuDrive::distinct(const MotionBlock& block) const {
@@ -68,8 +75,9 @@ Task<Result<void>> YakoRtuDrive::replace_canary(MotionBlock block) {
     std::ranges::copy(found->registers, present.begin());
     const bool known = canary_.is_expected(present);
     const bool restarted = !known && !canary_.blocks().empty();
+    auto lost = lost_memory(present);
     if (!known) forget_power_cycle(present);
-    if (restarted) co_return fail(lost_memory());
+    if (restarted) co_return fail(std::move(lost));
     auto fresh = in(TransactionClass::motion);
     fresh.deadline = found->sent_at + setup_.reboot_guard;
     auto written = co_await write_canary(distinct(block), fresh);
@@ -84,8 +92,9 @@ Task<Result<modbus_rtu::Answer>> YakoRtuDrive::read_canary(TransactionOptions op
   if (!recognise_canary(answer->registers)) {
     MotionBlock found{};
     std::ranges::copy(answer->registers, found.begin());
+    auto lost = lost_memory(found);
     forget_power_cycle(found);
-    co_return fail(lost_memory());
+    co_return fail(std::move(lost));
   }
   note_proof(answer->sent_at);
   co_return answer;

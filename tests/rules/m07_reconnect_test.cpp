@@ -1,4 +1,4 @@
-// A drive that is restarted while its axis is finding it again (M7).
+// A drive that is restarted while its axis is finding it again, and what is told of a lost canary (M7).
 #include <gtest/gtest.h>
 
 #include "tests/support/rig.hpp"
@@ -43,6 +43,25 @@ TEST(M07, PowerCycleWhileTheAxisIsConnecting) {
       EXPECT_EQ(rig.state()->reboots, 1);
     }
   });
+}
+
+/// It is taken for a restart either way; but who looks for the cause is to find it.
+TEST(M07, ParametersThatAnotherMasterWroteAreToldAsWhatTheyMayBe) {
+  constexpr std::uint16_t factory[] = {5, 100, 100, 60, 0, 5000};
+  for (const bool restarted : {true, false}) {
+    Rig rig;
+    rig.ready();
+    const auto move = rig.submit(MoveAbsoluteRequest{.position = 300});
+    rig.run(300ms);
+    for (std::uint16_t i = 0; i < std::size(factory); ++i)
+      rig.write_behind(static_cast<std::uint16_t>(canary + i),
+                       static_cast<std::uint16_t>(factory[i] + (restarted ? 0 : 1)));
+    ASSERT_TRUE(rig.run_until([&] { return move->has_ended(); }, 2s));
+    const auto& cause = move->value().cause;
+    ASSERT_TRUE(cause) << describe(move->value());
+    EXPECT_EQ(cause->reason, Reason::rebooted);
+    EXPECT_EQ(cause->message.find("another master wrote") == std::string::npos, restarted) << cause->message;
+  }
 }
 
 }  // namespace
