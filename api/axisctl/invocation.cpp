@@ -156,8 +156,9 @@ std::string misspelt(const CLI::App& app, const CLI::App& command, std::string_v
   return {};
 }
 
-/// The same of options.
-std::string misspelt_option(const CLI::App& app, const CLI::App* command) {
+/// The same of options. Behind "--" all words are values.
+std::string misspelt_option(const CLI::App& app, const CLI::App* command,
+                            const std::vector<std::string>& words) {
   std::vector<std::string> known;
   for (; command != nullptr; command = command->get_parent())
     for (const auto* option : command->get_options())
@@ -165,6 +166,11 @@ std::string misspelt_option(const CLI::App& app, const CLI::App* command) {
   for (const auto& word : app.remaining(true)) {
     const auto name = word.substr(0, word.find('='));
     if (!name.starts_with("--") || name.size() < 4) continue;
+    const bool known_one = std::ranges::find(known, name) != known.end();
+    if (known_one && std::ranges::find(words, "--") != words.end())
+      return fmt::format("{} stands behind '--', where it is a value; give it before that",
+                         config::quoted(name));
+    if (known_one) continue;
     if (const auto near = did_you_mean(name, known, ""); !near.empty())
       return fmt::format("there is no option {}; {}", config::quoted(name), near);
   }
@@ -181,7 +187,7 @@ Failure usage_error(const CLI::App& app, const CLI::ParseError& error,
   }
   if (command->get_require_subcommand_min() > 0)
     if (const auto text = misspelt(app, *command, help, words); !text.empty()) return {ExitCode::usage, text};
-  if (const auto text = misspelt_option(app, command); !text.empty()) return {ExitCode::usage, text};
+  if (const auto text = misspelt_option(app, command, words); !text.empty()) return {ExitCode::usage, text};
   return {ExitCode::usage, fmt::format("{}; see '{} --help'", error.what(), help)};
 }
 

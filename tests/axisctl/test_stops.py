@@ -321,6 +321,8 @@ class CommandLine(AxisctlTest):
     def test_a_misspelt_command_is_named(self):
         self.assertIn("there is no option '--velocty'; did you mean '--velocity'?",
                       self.fails(2, "move", "feeder", "5mm", "--velocty", "5mm/s"))
+        self.assertIn("'--wait' stands behind '--', where it is a value; give it before that",
+                      self.fails(2, "move", "feeder", "--relative", "--", "-5", "--wait"))
         self.assertIn("there is no command 'mov'; did you mean 'move'?", self.fails(2, "mov", "feeder", "5mm"))
         self.assertIn("there is no command 'stpo'; did you mean 'stop'?", self.fails(2, "group", "stpo", "transfer"))
         self.assertIn("AXIS is required", self.fails(2, "halt"))
