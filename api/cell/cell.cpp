@@ -52,6 +52,7 @@ Cell::Cell(boost::asio::io_context& io, Clock& clock, const Settings& settings, 
                  .touched = [this](const std::set<std::string>& names) { on_touched(names); },
                  .answered = [this](const std::string& name,
                                     const PeerAnswer& answer) { on_answered(name, answer); }}),
+      clocks_(clock, machines_),
       registry_(settings.etcd.endpoints.empty()
                     ? nullptr
                     : std::make_unique<RegistryKeeper>(
@@ -95,6 +96,7 @@ void Cell::remember() {
 void Cell::start() {
   registry_was_ = registry_state();
   machines_.start();
+  if (!settings_.metrics.empty()) clocks_.start();  // else nobody would see them
   look_at_own();
   if (registry_) registry_->start();
 }
@@ -111,6 +113,7 @@ void Cell::end(std::function<void()> done) {
   event_readers_.finish(over);
   group_moves_.end(over);
   own_timer_.reset();
+  clocks_.end();
   machines_.end();
   stop_all_.end();
   if (!registry_) return done();
@@ -127,8 +130,8 @@ void Cell::tell(v1::CellEvent event) {
 }
 
 void Cell::on_changed(const Roster::Change& change) {
-  if (is_there(change.to) && !is_there(change.from)) ++births_;
-  if (is_there(change.from) && !is_there(change.to)) ++deaths_;
+  if (is_there(change.to) && !is_there(change.from)) ++lives_.births;
+  if (is_there(change.from) && !is_there(change.to)) ++lives_.deaths;
   auto* const entry = machines_.roster().entries().contains(change.name)
                           ? &machines_.roster().entries().find(change.name)->second
                           : nullptr;
@@ -232,6 +235,14 @@ v1::ListMachinesResponse Cell::list() const {
   v1::ListMachinesResponse response;
   for (const auto& [name, entry] : machines_.roster().entries())
     *response.add_machines() = machines_.machine(name);
+  return response;
+}
+
+v1::GetClockResponse Cell::read_clock() const {
+  v1::GetClockResponse response;
+  response.set_machine(settings_.machine);
+  response.set_instance_id(identity_.instance_id);
+  set_duration(*response.mutable_clock(), clock_.now().time_since_epoch());
   return response;
 }
 
@@ -351,11 +362,11 @@ Reading Cell::reading() const {
     reading.machines.push_back({.name = name,
                                 .state = entry.state,
                                 .round_trip = last ? std::optional(last->round_trip) : std::nullopt,
-                                .stop_all = last && last->inhibited});
+                                .stop_all = last && last->inhibited,
+                                .clock = clocks_.of(name)});
   }
   reading.tallies = machines_.tallies();
-  reading.births = births_;
-  reading.deaths = deaths_;
+  reading.lives = lives_;
   reading.stops_standing = stop_all_.machine().standing().size();
   reading.told_again = stop_all_.told_again();
   reading.durable = !stop_all_.not_durable();

@@ -11,6 +11,7 @@
 #include <string>
 
 #include "api/cell/callers.hpp"
+#include "api/cell/clock_watch.hpp"
 #include "api/cell/core_stream.hpp"
 #include "api/cell/disk.hpp"
 #include "api/cell/event_log.hpp"
@@ -52,6 +53,7 @@ class Cell {
   // What CellService asks for.
   [[nodiscard]] v1::GetCellResponse get(const Caller& caller) const;
   [[nodiscard]] v1::ListMachinesResponse list() const;
+  [[nodiscard]] v1::GetClockResponse read_clock() const;
   void watch_machines(const std::shared_ptr<CoreStream<v1::WatchMachinesResponse>>& stream);
   void watch_events(const std::shared_ptr<CoreStream<v1::WatchEventsResponse>>& stream,
                     const v1::WatchEventsRequest& request);
@@ -96,6 +98,7 @@ class Cell {
   Disk disk_;
   EventLog events_;
   Machines machines_;
+  ClockWatch clocks_;
   std::unique_ptr<RegistryKeeper> registry_;  ///< nullptr: without etcd
   StopAllKeeper stop_all_;
   GroupMoves group_moves_;
@@ -110,7 +113,7 @@ class Cell {
   TimePoint registry_since_;
   std::string held_by_;  ///< who has this machine's name, as it was told last
   std::string saved_registry_;
-  std::uint64_t births_ = 0, deaths_ = 0;
+  Reading::Lives lives_;
   Clock::Timer own_timer_;
   std::shared_ptr<int> alive_ = std::make_shared<int>();
 };

@@ -147,6 +147,16 @@ grpc::ServerWriteReactor<v1::WatchEventsResponse>* CellServiceImpl::WatchEvents(
       context, [this, asked = *request](const auto& stream) { cell_.watch_events(stream, asked); });
 }
 
+grpc::ServerUnaryReactor* CellServiceImpl::GetClock(grpc::CallbackServerContext* context,
+                                                    const v1::GetClockRequest* request,
+                                                    v1::GetClockResponse* response) {
+  return serve<v1::GetClockRequest, v1::GetClockResponse>(
+      context, request, response,
+      [this](const Caller&, const v1::GetClockRequest&, const Answer<v1::GetClockResponse>& answer) {
+        answer(grpc::Status::OK, cell_.read_clock());
+      });
+}
+
 grpc::ServerUnaryReactor* CellServiceImpl::ExchangeStopAll(grpc::CallbackServerContext* context,
                                                            const v1::ExchangeStopAllRequest* request,
                                                            v1::ExchangeStopAllResponse* response) {

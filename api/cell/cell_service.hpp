@@ -44,6 +44,8 @@ class CellServiceImpl final : public v1::CellService::CallbackService {
                                       v1::MoveGroupResponse* response) override;
   grpc::ServerWriteReactor<v1::WatchEventsResponse>* WatchEvents(
       grpc::CallbackServerContext* context, const v1::WatchEventsRequest* request) override;
+  grpc::ServerUnaryReactor* GetClock(grpc::CallbackServerContext* context, const v1::GetClockRequest* request,
+                                     v1::GetClockResponse* response) override;
   grpc::ServerUnaryReactor* ExchangeStopAll(grpc::CallbackServerContext* context,
                                             const v1::ExchangeStopAllRequest* request,
                                             v1::ExchangeStopAllResponse* response) override;

@@ -13,6 +13,10 @@ namespace {
 /// A GetInfo is answered from what an axisd has in memory.
 constexpr Duration who_patience = std::chrono::milliseconds(1500);
 
+grpc::Status unknown_entrance() {
+  return {grpc::StatusCode::UNAVAILABLE, "it is not known where its entrance is"};
+}
+
 }  // namespace
 
 bool is_for_another(const grpc::Status& status) {
@@ -118,9 +122,15 @@ void MachineLink::release_stop_all(const Metadata& metadata, Duration timeout,
       });
 }
 
+void MachineLink::read_clock(Duration timeout, ClockRead done) {
+  if (!cell_) return done(unknown_entrance(), {});
+  ask<v1::GetClockResponse>(
+      core_, cell_, {.path = "/axisd.cell.v1.CellService/GetClock", .timeout = timeout, .metadata = {}},
+      v1::GetClockRequest(), std::move(done));
+}
+
 void MachineLink::exchange(const v1::ExchangeStopAllRequest& request, Duration timeout, Exchanged done) {
-  if (!cell_)
-    return done(grpc::Status(grpc::StatusCode::UNAVAILABLE, "it is not known where its entrance is"), {});
+  if (!cell_) return done(unknown_entrance(), {});
   ask<v1::ExchangeStopAllResponse>(
       core_, cell_,
       {.path = "/axisd.cell.v1.CellService/ExchangeStopAll", .timeout = timeout, .metadata = {}}, request,

@@ -90,6 +90,9 @@ class MachineLink {
   void stop_all(const Metadata& metadata, Duration timeout, Stopped done);
   void release_stop_all(const Metadata& metadata, Duration timeout,
                         std::function<void(const grpc::Status&)> done);
+  using ClockRead = std::function<void(const grpc::Status&, const v1::GetClockResponse&)>;
+  /// Of its entrance.
+  void read_clock(Duration timeout, ClockRead done);
   using Exchanged = std::function<void(const grpc::Status&, const v1::ExchangeStopAllResponse&)>;
   /// With its entrance.
   void exchange(const v1::ExchangeStopAllRequest& request, Duration timeout, Exchanged done);

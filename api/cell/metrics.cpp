@@ -44,6 +44,19 @@ void write_machines(Exposition& to, const Reading& reading) {
     to.sample(Labels().with("machine", machine.name), machine.stop_all ? 1 : 0);
 }
 
+void write_clocks(Exposition& to, const Reading& reading) {
+  to.family("axisd_cell_machine_clock_offset_seconds", MetricType::gauge,
+            "The clock of the machine's computer less this one's; each counts since its start.");
+  for (const auto& machine : reading.machines)
+    if (machine.clock)
+      to.sample(Labels().with("machine", machine.name), metrics::in_seconds(machine.clock->offset));
+  to.family("axisd_cell_machine_clock_error_seconds", MetricType::gauge,
+            "By which the offset of the machine's clock is off at most.");
+  for (const auto& machine : reading.machines)
+    if (machine.clock)
+      to.sample(Labels().with("machine", machine.name), metrics::in_seconds(machine.clock->error));
+}
+
 void write_cell(Exposition& to, const Reading& reading) {
   to.family("axisd_cell_info", MetricType::info, "Which entrance this is.");
   to.sample(
@@ -54,9 +67,9 @@ void write_cell(Exposition& to, const Reading& reading) {
   to.family("axisd_cell_registry_age_seconds", MetricType::gauge, "Since etcd was last heard of.");
   if (reading.registry_age) to.sample({}, metrics::in_seconds(*reading.registry_age));
   to.family("axisd_cell_births_total", MetricType::counter, "Machines that began to answer.");
-  to.sample({}, reading.births);
+  to.sample({}, reading.lives.births);
   to.family("axisd_cell_deaths_total", MetricType::counter, "Machines that ceased to answer.");
-  to.sample({}, reading.deaths);
+  to.sample({}, reading.lives.deaths);
   to.family("axisd_cell_stop_all", MetricType::gauge, "StopAll of the cell that were not released.");
   to.sample({}, reading.stops_standing);
   to.family("axisd_cell_stop_all_durable", MetricType::gauge, "1: what is known of StopAll is on the disk.");
@@ -113,6 +126,7 @@ std::string render(const Reading& reading, metrics::Format format) {
   Exposition to(format);
   write_cell(to, reading);
   write_machines(to, reading);
+  write_clocks(to, reading);
   write_moves(to, reading);
   write_calls(to, reading);
   return to.take();

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "api/cell/clock_samples.hpp"
 #include "api/cell/group_moves.hpp"
 #include "api/cell/routes.hpp"
 #include "api/exposition/exposition.hpp"
@@ -24,13 +25,19 @@ struct Reading {
     v1::MachineState state;
     std::optional<Duration> round_trip;
     bool stop_all;
+    std::optional<ClockSamples::Offset> clock{};  ///< of its computer
+  };
+  /// How many machines began to answer, and ceased to.
+  struct Lives {
+    std::uint64_t births = 0, deaths = 0;
   };
   std::string cell, machine;
   v1::RegistryState registry{};
   std::optional<Duration> registry_age;  ///< since etcd was last heard of
   std::vector<MachineReading> machines;
   std::map<std::string, std::shared_ptr<RouteTally>> tallies;
-  std::uint64_t births = 0, deaths = 0, told_again = 0, refused = 0, too_many = 0;
+  Lives lives;
+  std::uint64_t told_again = 0, refused = 0, too_many = 0;
   std::size_t stops_standing = 0;
   bool durable = true;
   int open_calls = 0;

@@ -71,6 +71,7 @@ class Dashboard(CellScenario):
         url = f"http://{self.one.address('press-1')}:9465/metrics"
         # Its text is made once a second.
         wait_for(lambda: len(scrape(url).named("axisd_cell_machine_round_trip_seconds")) == 3, "all have answered")
+        wait_for(lambda: len(scrape(url).named("axisd_cell_machine_clock_offset_seconds")) == 2, "the others' clocks are known")
         served = scrape(url)
         _, _, page = (ROOT / "docs" / "metrics.md").read_text().partition("\n## A cell\n")
         rows = {name: (kind, labels, words) for name, kind, labels, words in ROW.findall(page)}
@@ -98,6 +99,9 @@ class Dashboard(CellScenario):
         for title, query in queries.of_dashboard("axisd-cell"):
             wait_for(lambda q=query: self.query(q), f"{title}: {query}")
         self.assertEqual(self.value('max(axisd_cell_machines{state="present"})'), 3)
+        # All of them are on one computer, and have one clock.
+        wait_for(lambda: len(self.query("axisd_cell_machine_clock_offset_seconds")) == 6, "each knows both others' clocks")
+        self.assertEqual(self.query("abs(axisd_cell_machine_clock_offset_seconds) > axisd_cell_machine_clock_error_seconds"), [])
 
         (rules,) = [group for group in self.ask("rules")["groups"] if group["name"] == "axisd-cell"]
         self.assertEqual({rule["name"] for rule in rules["rules"]}, set(queries.of_alerts("axisd-cell")))

@@ -129,6 +129,7 @@ class Entrance:
         self.address = listen or f"{HOST}:{7500 + self.number}"
         self.axisd = axisd or f"unix:{machine.socket}"
         self.program = self.notify = None
+        self.before = ()  # the program and its options that start it
         self._clients, self._runs = [], 0
 
     def text(self):
@@ -147,7 +148,7 @@ class Entrance:
             self.notify = NotifySocket(self.directory)
         self.notify.forget()
         self.program = Program(f"axisd-cell-{self.number}-{self._runs}",
-                               [AXISD_CELL, "--config", self.config, "--machine-id-file", self.computer],
+                               [*self.before, AXISD_CELL, "--config", self.config, "--machine-id-file", self.computer],
                                self.machine.directory, {"NOTIFY_SOCKET": self.notify.path})
         if wait:
             self.notify.wait_for("READY=1", self.program)
