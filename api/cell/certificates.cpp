@@ -2,7 +2,9 @@
 
 #include <spdlog/spdlog.h>
 
+#include <fstream>
 #include <optional>
+#include <sstream>
 #include <utility>
 #include <vector>
 
@@ -27,9 +29,26 @@ std::vector<std::string> paths_of(const Settings& settings) {
   return paths;
 }
 
+/// Of all that is used. Blocks for the disk.
+std::vector<tls::Expiry> expiries_of(const Settings& settings, const tls::Live* live) {
+  std::vector<tls::Expiry> all;
+  if (live != nullptr)
+    all = tls::expiries(live->paths(), live->served()->contents, std::chrono::system_clock::now());
+  for (const auto& files : {settings.axisd.tls, settings.etcd.tls}) {
+    if (files.certificate.empty()) continue;
+    const std::ifstream file(files.certificate);
+    std::ostringstream text;
+    text << file.rdbuf();
+    all.push_back(
+        {.path = files.certificate, .what = "the certificate", .at = tls::first_expiry(text.str())});
+  }
+  return all;
+}
+
 /// What a look has found: on the disk's thread.
 struct Found {
   std::optional<Trust> trust{};
+  std::vector<tls::Expiry> expiries{};  ///< of trust
   std::optional<Error> error{};
 };
 
@@ -39,7 +58,8 @@ Certificates::Certificates(const Settings& settings, std::shared_ptr<tls::Live> 
     : settings_(&settings),
       live_(std::move(live)),
       trust_(std::move(trust)),
-      watch_(std::make_shared<tls::FileWatch>(paths_of(settings))) {
+      watch_(std::make_shared<tls::FileWatch>(paths_of(settings))),
+      expiries_(expiries_of(settings, live_.get())) {
   (void)watch_->settled();
   (void)watch_->settled();
 }
@@ -64,6 +84,19 @@ Result<Certificates> Certificates::read(const Settings& settings) {
   return Certificates(settings, std::move(live), *std::move(trust));
 }
 
+std::vector<std::string> Certificates::expired(WallTime now) const {
+  std::vector<std::string> lines;
+  for (const auto& notice : tls::Reminder().due(expiries_, now, TimePoint()))
+    if (notice.over) lines.push_back(notice.text);
+  return lines;
+}
+
+void Certificates::remind() {
+  const auto now = clock_->now();
+  for (const auto& notice : reminder_.due(expiries_, clock_->wall(now), now))
+    spdlog::log(notice.over ? spdlog::level::err : spdlog::level::warn, "{}", notice.text);
+}
+
 void Certificates::keep(Clock& clock, Cell& cell) {
   clock_ = &clock;
   cell_ = &cell;
@@ -72,6 +105,7 @@ void Certificates::keep(Clock& clock, Cell& cell) {
 
 void Certificates::look() {
   timer_ = clock_->call_at(clock_->now() + look_period, [this] { look(); });
+  remind();
   const auto found = std::make_shared<Found>();
   cell_->disk().run(
       [found, watch = watch_, live = live_, settings = settings_] {
@@ -80,16 +114,19 @@ void Certificates::look() {
           if (auto read = live->reload(); !read) found->error = read.error();
         }
         auto trust = trust_of(*settings);
-        if (trust)
-          found->trust = *std::move(trust);
-        else
+        if (!trust) {
           found->error = trust.error();
+          return;
+        }
+        found->trust = *std::move(trust);
+        found->expiries = expiries_of(*settings, live.get());
       },
-      [found, cell = cell_] {
+      [this, found, cell = cell_] {
         if (found->error)
           spdlog::error("certificates: {}; what was used before stays", to_string(*found->error));
         if (!found->trust) return;
         if (!found->error) spdlog::info("certificates were read again");
+        expiries_ = std::move(found->expiries);
         cell->trust(*found->trust);
       });
 }

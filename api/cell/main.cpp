@@ -188,6 +188,9 @@ int main(int argc, char** argv) {
   auto certificates = Certificates::read(settings);
   if (!certificates) return give_up(certificates.error());
   if (options.check) {
+    const auto expired = certificates->expired(std::chrono::system_clock::now());
+    for (const auto& line : expired) std::cerr << line << '\n';
+    if (!expired.empty()) return program::wrong;
     std::cout << options.config << ": ok\n";
     return 0;
   }

@@ -20,14 +20,14 @@ class Certificates:
     def path(self, suffix, name=None):
         return str(self.directory / f"{name or self.name}.{suffix}")
 
-    def issue(self, name):
-        """Signs a certificate for the loopback address."""
+    def issue(self, name, days=2):
+        """Signs a certificate for the loopback address; `days`: until its end, which may be over."""
         request, extensions = self.path("csr", name), self.directory / f"{name}.ext"
         extensions.write_text("subjectAltName=DNS:localhost,IP:127.0.0.1\n")
         openssl("req", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes", "-subj", f"/CN={name}",
                 "-keyout", self.path("key", name), "-out", request)
         openssl("x509", "-req", "-in", request, "-CA", self.path("crt"), "-CAkey", self.path("key"), "-CAcreateserial",
-                "-days", "2", "-extfile", str(extensions), "-out", self.path("crt", name))
+                "-days", str(days), "-extfile", str(extensions), "-out", self.path("crt", name))
 
     def revoke_nothing(self):
         """Writes its revocation list, which names nobody."""

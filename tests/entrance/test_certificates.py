@@ -7,8 +7,8 @@ import unittest
 import grpc
 
 from certificates import Certificates
-from harness import OWN_NAME, Client, axis_pb, pb, spinner, system_pb, wait_for
-from support import PRESENT, SILENT, CellScenario, cell_pb, cell_service_pb2_grpc
+from harness import OWN_NAME, Client, axis_pb, pb, run, spinner, system_pb, wait_for
+from support import AXISD_CELL, PRESENT, SILENT, CallFailed, CellScenario, cell_pb, cell_service_pb2_grpc
 
 #: The entrance comes by a unix socket, as this user of the computer, and so do the tests themselves.
 ACCESS = f"access: {{ roles: {{ {OWN_NAME}: maintainer, cell.hall-1: viewer }}, " \
@@ -128,7 +128,13 @@ class CertificatesOfCallers(CellScenario):
         self.refused("FAILED_PRECONDITION", "INVALID_ARGUMENT", entrance.call, entrance.cell.ExchangeStopAll,
                      cell_pb.ExchangeStopAllRequest(cell="hall-2"))
 
-    def test_another_machine_by_mutual_tls(self):
+    def put(self, name, authority=None):
+        """The pair that the entrance shows other machines."""
+        for suffix in ("key", "crt"):
+            shutil.copy((authority or self.authority).path(suffix, name), f"{self.one.directory}/own.{suffix}")
+
+    def begin_with_another_machine(self):
+        """press-2, which is reached by mutual TLS."""
         other = self.machine({"spinner": spinner()}, name="press-2")
         other.server = (f"{{ listen: 127.0.0.1:0, tls: {{ certificate: {self.path('crt', 'server')}, "
                         f"key: {self.path('key', 'server')}, client_ca: {self.authority.path('crt')} }} }}\n{ACCESS}")
@@ -138,11 +144,14 @@ class CertificatesOfCallers(CellScenario):
         port = wait_for(lambda: re.search(r"serves 'press-2' on port (\d+)", daemon.log()), "its port")[1]
         lane = re.search(r"stops are taken on port (\d+) as well", daemon.log())[1]
         own = self.one.directory
-        for suffix in ("crt", "key"):
-            shutil.copy(self.path(suffix, "cell.hall-1"), f"{own}/own.{suffix}")
+        self.put("cell.hall-1")
         self.keys += f"peers: {{ press-2: {{ axisd: localhost:{port}, stop: localhost:{lane} }} }}\n"
         self.here = self.with_certificates(
             f"tls: {{ ca: {self.authority.path('crt')}, certificate: {own}/own.crt, key: {own}/own.key }}")
+        return self.here
+
+    def test_another_machine_by_mutual_tls(self):
+        self.begin_with_another_machine()
         anna = self.connect("anna")
         wait_for(lambda: self.machines(anna).get("press-2") == PRESENT, "press-2 answers")
         for _ in range(2):
@@ -151,16 +160,46 @@ class CertificatesOfCallers(CellScenario):
             self.assertEqual(pb.CommandKind.Name(command.kind), "COMMAND_KIND_STOP")
             # The same again with a certificate that was replaced meanwhile.
             self.authority.issue("cell.hall-1")
-            for suffix in ("key", "crt"):
-                shutil.copy(self.path(suffix, "cell.hall-1"), f"{own}/own.{suffix}")
+            self.put("cell.hall-1")
             wait_for(lambda: "certificates were read again" in self.here.program.log(), "they are read again")
             wait_for(lambda: self.machines(anna).get("press-2") == PRESENT, "press-2 answers")
             time.sleep(1.5)
             wait_for(lambda: self.machines(anna).get("press-2") == PRESENT, "press-2 answers")
         # One that press-2 does not accept.
-        for suffix in ("key", "crt"):
-            shutil.copy(self.others.path(suffix, "stranger"), f"{own}/own.{suffix}")
+        self.put("stranger", self.others)
         wait_for(lambda: self.machines(anna).get("press-2") == SILENT, "press-2 does not answer a stranger")
+
+    def test_certificates_that_have_expired(self):
+        """Of a caller, of the entrance before other machines, and of the entrance before its callers."""
+        here = self.begin_with_another_machine()
+        anna = self.connect("anna")
+        wait_for(lambda: self.machines(anna).get("press-2") == PRESENT, "press-2 answers")
+        self.authority.issue("late", days=-1)
+        with self.assertRaises(CallFailed):
+            late = self.connect("late")
+            late.call(late.cell.GetCell, cell_pb.GetCellRequest(), timeout=5)
+
+        self.authority.issue("cell.hall-1", days=-1)
+        self.put("cell.hall-1")
+        wait_for(lambda: self.machines(anna).get("press-2") == SILENT, "press-2 lets it in no more")
+        own = f"{self.one.directory}/own.crt"
+        wait_for(lambda: f"{own}: the certificate has expired" in here.program.log(), "it says why")
+        self.assertEqual(self.machines(anna).get("press-1"), PRESENT)
+        self.connect("anna").to_done("Enable", "spinner")
+        checked = run([AXISD_CELL, "--config", here.config, "--check"])
+        self.assertEqual(checked.returncode, 2, checked.stdout)
+        self.assertIn(f"{own}: the certificate has expired", checked.stderr)
+        self.authority.issue("cell.hall-1")
+        self.put("cell.hall-1")
+        wait_for(lambda: self.machines(anna).get("press-2") == PRESENT, "press-2 lets it in again")
+
+        # What it serves with stays until there is a better one; a start refuses it.
+        self.authority.issue("server", days=-1)
+        wait_for(lambda: "what was used before stays" in here.program.log(), "it says so")
+        self.assertEqual(self.machines(self.connect("anna")).get("press-1"), PRESENT)
+        checked = run([AXISD_CELL, "--config", here.config, "--check"])
+        self.assertNotEqual(checked.returncode, 0)
+        self.assertIn("the certificate has expired", checked.stderr)
 
 
 if __name__ == "__main__":
