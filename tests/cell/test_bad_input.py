@@ -91,7 +91,9 @@ class OneEntrance(CellScenario):
                 (lambda text: text.replace("cell.key", "server.key", 1).replace("key: ", "key: /nowhere", 1), "nowhere"),
                 (lambda text: text.replace("machine: press-1", "machine: Press 1"), "machine"),
                 (lambda text: re.sub(r"(?m)^tls:.*$", "", text), "TLS"),
-                (lambda text: text + "etcd: { endpoints: [ here ], ttl: 1 s }\n", "etcd")):
+                (lambda text: text + "etcd: { endpoints: [ here ] }\n", "'etcd.endpoints' cannot have 'here'"),
+                (lambda text: text + "etcd: { endpoints: [ here:2379 ], ttl: 1 s }\n", "'etcd.ttl' cannot be '1 s'"),
+                (lambda text: text + "etcd: { endpoints: [ here:2379 ], ttl: 301 s }\n", "'etcd.ttl' cannot be '301 s'")):
             path = pathlib.Path(self.one.path("press-1", "cell.yaml"))
             kept = path.read_text()
             path.write_text(change(kept))
@@ -150,6 +152,8 @@ class Registered(CellScenario):
         client = CellClient(cell, "press-2")
         wait_for(lambda: client.states().get("press-1") == "PRESENT", "press-1 is known all the same")
         CellClient(cell, "press-2", "press-1").state(AXIS)
+        wait_for(lambda: "space" in client.registry_trouble().message, "it is told why press-2 is not registered")
+        self.assertEqual(client.registry(), "DEGRADED")
 
         cell.etcd.done("root", "del", "--prefix", "/full/")
         revision = re.search(r'"revision":(\d+)', cell.etcd.done("root", "get", "x", "--write-out", "json"))[1]
@@ -168,11 +172,43 @@ class Registered(CellScenario):
         path.write_text(f"{head}\netcd:\n" + etcd.replace(cell.path("press-1", "ca.crt"), cell.path("other", "ca.crt")))
         cell.start_all()
         client = CellClient(cell, "press-1")
-        wait_for(lambda: client.registry() == "DEGRADED", "it is degraded")
-        trouble = client.call(client.cell.GetCell, cell_pb.GetCellRequest()).registry_trouble
-        self.assertTrue(trouble.message and trouble.remedy, trouble)
+        self.expect_degraded(client, "etcd at ")
+
+    def expect_degraded(self, client, why):
+        """It says why, and its machine works."""
+        wait_for(lambda: why in client.registry_trouble().message, why)
+        self.assertEqual(client.registry(), "DEGRADED")
+        self.assertTrue(client.registry_trouble().remedy)
         wait_for(lambda: client.states()["press-1"] in ("PRESENT", "UNREGISTERED"), "its machine answers")
         client.state(AXIS)
+
+    def test_a_certificate_for_etcd_that_has_expired(self):
+        cell = self.cell(machines=1, members=1)
+        own, pki = pathlib.Path(cell.path("press-1", "cell.crt")), cell.path("pki")
+        good, key, request = own.read_bytes(), cell.path("press-1", "cell.key"), cell.path("late.csr")
+        for words in (["-x509toreq", "-in", str(own), "-signkey", key, "-out", request],
+                      ["-req", "-in", request, "-CA", f"{pki}/ca.crt", "-CAkey", f"{pki}/ca.key", "-CAcreateserial", "-days",
+                       "-1", "-out", str(own)]):
+            done = run(["openssl", "x509", "-copy_extensions", "copy", *words])
+            self.assertEqual(done.returncode, 0, done.stderr)
+        cell.start_all()
+        client = CellClient(cell, "press-1")
+        self.expect_degraded(client, "etcd at ")
+        program = cell.programs["press-1", "cell"]
+        wait_for(lambda: f"{own}: the certificate has expired" in program.log(), "it says which one")
+        own.write_bytes(good)
+        wait_for(lambda: client.registry() == "OK", "it is read again")
+
+    def test_a_cell_that_is_not_its_own(self):
+        """etcd permits nothing outside of the cell that the certificate is for."""
+        cell = self.cell(machines=1, members=1)
+        path = pathlib.Path(cell.path("press-1", "cell.yaml"))
+        path.write_text(re.sub(r"(?m)^cell: demo$", "cell: other", path.read_text()))
+        cell.start_all()
+        client = CellClient(cell, "press-1")
+        self.expect_degraded(client, "permission denied")
+        self.assertEqual(client.call(client.cell.GetCell, cell_pb.GetCellRequest()).cell, "other")
+        self.assertEqual(cell.etcd.done("root", "get", "--prefix", "/axisd/", "--keys-only").strip(), "")
 
 
 if __name__ == "__main__":

@@ -2,11 +2,25 @@
 import os
 import pathlib
 import signal
+import socket
+import threading
 import time
+import types
 import unittest
 
 from harness import run, system_pb, wait_for
-from support import (AXISD_CELL, DEGRADED, GONE, OK, PRESENT, SILENT, CellScenario, cell_pb, seconds_until)
+from support import (AXISD_CELL, DEGRADED, GONE, HOST, OK, PRESENT, SILENT, CellScenario, cell_pb, seconds_until)
+
+
+def answer_nonsense(listener):
+    """Until it is closed."""
+    while True:
+        try:
+            connection, _ = listener.accept()
+        except OSError:
+            return
+        with connection:
+            connection.sendall(b"220 welcome\r\n")
 
 
 class Registry(CellScenario):
@@ -156,6 +170,25 @@ class Registry(CellScenario):
         self.assertEqual(list(here.machines()), ["press-1"])
         self.assertEqual(here.get().registry, OK)
         self.assertEqual(len(here.get().stop_all), 0)
+
+    def test_wrong_endpoints_are_told_and_passed_over(self):
+        """Where nobody listens, where something else does, and where another service of gRPC does."""
+        listener = socket.create_server((HOST, 0))
+        self.addCleanup(listener.close)
+        threading.Thread(target=answer_nonsense, args=(listener,), daemon=True).start()
+        other = self.entrance(self.press(9))
+        wrong = [f"{HOST}:1", f"{HOST}:{listener.getsockname()[1]}", other.address]
+        here = self.entrance(self.press(1), types.SimpleNamespace(endpoints=wrong))
+        for endpoint in wrong:
+            wait_for(lambda e=endpoint: e in here.get().registry_trouble.message, f"{endpoint} is named")
+        self.assertEqual(here.get().registry, DEGRADED)
+        self.assertTrue(here.get().registry_trouble.remedy)
+        here.wait_for_state("press-1", PRESENT)
+        self.assertEqual(here.client.info().machine, "press-1")
+        here.stop()
+        here.etcd = types.SimpleNamespace(endpoints=[*wrong, *self.etcd().endpoints])
+        here.start()
+        wait_for(lambda: here.get().registry == OK, "the last one is etcd")
 
     def test_watching_tells_the_whole_list_and_then_changes(self):
         self.cell(2)

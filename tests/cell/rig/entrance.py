@@ -87,6 +87,9 @@ class CellClient(Client):
         answer = self.call(self.cell.GetCell, cell_pb.GetCellRequest())
         return cell_pb.RegistryState.Name(answer.registry).removeprefix("REGISTRY_STATE_")
 
+    def registry_trouble(self):
+        return self.call(self.cell.GetCell, cell_pb.GetCellRequest()).registry_trouble
+
 
 class MachineWatch:
     """What one entrance tells of machines, with the time when it came."""
