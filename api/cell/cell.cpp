@@ -67,7 +67,7 @@ Cell::Cell(boost::asio::io_context& io, Clock& clock, const Settings& settings, 
                  .disk = disk_,
                  .tell = [this](v1::CellEvent event) { tell(std::move(event)); },
                  .instance_id = identity_.instance_id}),
-      group_moves_(io.get_executor(), clock, routes),
+      group_moves_(io.get_executor(), clock, routes, [this](v1::CellEvent event) { tell(std::move(event)); }),
       registry_since_(clock.now()) {
   remember();
 }

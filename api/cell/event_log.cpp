@@ -4,11 +4,35 @@
 #include <utility>
 
 namespace axisd::cell {
+namespace {
+
+/// Empty: no client has.
+const std::string& caused_by(const v1::CellEvent& event) {
+  if (event.has_group_move()) return event.group_move().client();
+  return event.kind() == v1::CELL_EVENT_KIND_STOP_ALL_RELEASED ? event.stop_all().released_by()
+                                                               : event.stop_all().by();
+}
+
+}  // namespace
 
 void EventLog::add(v1::CellEvent event) {
   event.set_sequence(++newest_);
-  events_.push_back(std::move(event));
-  if (events_.size() > most) events_.pop_front();
+  auto& lane = lanes_[event.kind()];
+  if (lane.size == most_of_kind) make_room(lane);
+  lane.by_client[caused_by(event)].push_back(newest_);
+  ++lane.size;
+  events_.emplace(newest_, std::move(event));
+}
+
+void EventLog::make_room(Lane& lane) {
+  const auto most = std::ranges::max_element(lane.by_client, {}, [](const auto& each) {
+    // Of equals whoever has the oldest.
+    return std::pair(each.second.size(), ~each.second.front());
+  });
+  events_.erase(most->second.front());
+  most->second.pop_front();
+  if (most->second.empty()) lane.by_client.erase(most);
+  --lane.size;
 }
 
 std::uint64_t EventLog::cursor_of(const v1::WatchEventsRequest& request) const {
@@ -21,13 +45,14 @@ v1::WatchEventsResponse EventLog::after(std::uint64_t& cursor) const {
   v1::WatchEventsResponse response;
   response.set_instance_id(instance_id_);
   response.set_newest(newest_);
-  const auto oldest = newest_ - events_.size() + 1;
-  if (cursor + 1 < oldest) {
-    response.set_lost(oldest - 1 - cursor);
-    cursor = oldest - 1;
+  std::uint64_t lost = 0;
+  for (auto event = events_.upper_bound(cursor);
+       event != events_.end() && response.events_size() < most_at_once; ++event) {
+    lost += event->first - cursor - 1;
+    cursor = event->first;
+    *response.add_events() = event->second;
   }
-  const auto end = std::min(newest_, cursor + most_at_once);
-  for (; cursor < end; ++cursor) *response.add_events() = events_[cursor + 1 - oldest];
+  response.set_lost(lost);
   response.set_cursor(cursor);
   return response;
 }

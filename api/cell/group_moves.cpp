@@ -7,6 +7,7 @@
 #include <set>
 #include <utility>
 
+#include "api/cell/group_move_steps.hpp"
 #include "api/cell/names.hpp"
 #include "api/cell/roster.hpp"
 #include "api/cell/status.hpp"
@@ -108,6 +109,7 @@ struct GroupMoves::Run {
   TimePoint start_by;       ///< so long its caller waits
   std::vector<Way> ways{};  ///< of each machine, as they were at the beginning
   GroupMoveMachine machine;
+  GroupMoveSteps steps{};
   struct Waiter {
     axisd::v1::WaitUntil until;
     Answer answer;
@@ -258,8 +260,16 @@ void GroupMoves::close(Run& run) {
                                                  : tally_.otherwise);
 }
 
+void GroupMoves::tell_steps(Run& run) const {
+  const auto steps = run.steps.look(run.machine);
+  if (steps.empty()) return;
+  const auto value = run.machine.value();
+  for (const auto step : steps) told_(event_of(step, value, run.caller.name, run.request_id));
+}
+
 /// Whoever waits hears what they wait for.
 void GroupMoves::settle(const RunPtr& run) {
+  tell_steps(*run);
   if (run->over() && !run->ways.empty()) close(*run);
   auto& waiters = run->waiters;
   for (auto waiter = waiters.begin(); waiter != waiters.end();) {

@@ -22,9 +22,10 @@ namespace axisd::cell {
 /// The moves of several machines that this entrance coordinates, and some that have ended. Thread: core.
 class GroupMoves {
  public:
-  /// `routes` and `clock` outlive this.
-  GroupMoves(boost::asio::any_io_executor core, Clock& clock, const RouteTable& routes)
-      : core_(std::move(core)), clock_(clock), routes_(routes) {}
+  /// `routes` and `clock` outlive this. `told`: how moves come along.
+  GroupMoves(boost::asio::any_io_executor core, Clock& clock, const RouteTable& routes,
+             std::function<void(v1::CellEvent)> told)
+      : core_(std::move(core)), clock_(clock), routes_(routes), told_(std::move(told)) {}
 
   using Answer = std::function<void(const grpc::Status&, const v1::MoveGroupResponse&)>;
   /// Begins a move, or attaches to the one of that request_id. `start_by`: the caller waits no longer, so
@@ -75,6 +76,7 @@ class GroupMoves {
   template <class Response>
   auto taker(const RunPtr& run, std::size_t machine, Event event);
   void tick(const RunPtr& run);
+  void tell_steps(Run& run) const;
   void settle(const RunPtr& run);
   void close(Run& run);
   void forget_oldest();
@@ -82,6 +84,7 @@ class GroupMoves {
   boost::asio::any_io_executor core_;
   Clock& clock_;
   const RouteTable& routes_;
+  const std::function<void(v1::CellEvent)> told_;
   std::list<RunPtr> runs_;  ///< oldest first
   Tally tally_;
 };

@@ -1,6 +1,7 @@
 """A move of axes of three machines, whose clocks are an hour apart: when they start, and who stops them."""
 import concurrent.futures
 import os
+import re
 import threading
 import time
 import unittest
@@ -8,7 +9,7 @@ import uuid
 
 import grpc
 
-from harness import feeder, group_pb, pb, run, wait_for
+from harness import Program, feeder, group_pb, pb, run, wait_for
 from harness.programs import AXISCTL
 from harness.wire import START, STOP
 from support import HOST, PRESENT, CellScenario, cell_pb, error_pb
@@ -101,6 +102,13 @@ class GroupMoves(CellScenario):
     def move(self, entrance, request):
         return entrance.client.call(entrance.client.cell.MoveGroup, request, timeout=60).move
 
+    def told(self, entrance):
+        """How moves came along, by the entrance's events."""
+        return [event.group_move for event in entrance.events() if event.kind == cell_pb.CELL_EVENT_KIND_GROUP_MOVE]
+
+    def steps(self, entrance):
+        return [cell_pb.GroupMoveStep.Name(move.step).removeprefix("GROUP_MOVE_STEP_") for move in self.told(entrance)]
+
     def starts(self):
         return [press.sim.shaft().starts for press in self.presses]
 
@@ -130,9 +138,15 @@ class GroupMoves(CellScenario):
 
     def test_three_axes_start_at_one_moment(self):
         entrance = self.entrance_of(self.presses[0])
-        move = self.move(entrance, self.request(60.0))
+        request = self.request(60.0)
+        move = self.move(entrance, request)
         self.assertEqual(move.state, pb.COMMAND_STATE_DONE, move)
         self.assertEqual(self.starts(), [1, 1, 1])
+        self.assertEqual(self.steps(entrance), ["PREPARED", "STARTED", "DONE"])
+        for event in self.told(entrance):
+            self.assertEqual((event.request_id, list(event.machines)),
+                             (request.options.request_id, [press.name for press in self.presses]))
+        self.assertEqual((event.start_skew, event.start_skew_error), (move.start_skew, move.start_skew_error))
         self.assertEqual([press.sim.shaft().position for press in self.presses], [60 * PULSES] * 3)
         bound = move.start_skew_error.ToNanoseconds()
         for number, part in enumerate(move.machines):
@@ -157,6 +171,8 @@ class GroupMoves(CellScenario):
         request.machines[1].targets[0].position = 900.0
         detail = self.refused("OUT_OF_RANGE", "SOFT_LIMIT", self.move, entrance, request)
         self.assertTrue(detail.message.startswith("press-2: feeder"), detail)
+        self.assertEqual(self.steps(entrance), ["FAILED"])
+        self.assertEqual(self.told(entrance)[0].cause, detail)
         for press in self.presses:
             press.client.wait_state("feeder", lambda s: s.state == pb.STATE_STANDSTILL, "it is free again")
         self.assertEqual(self.starts(), [0, 0, 0])
@@ -256,13 +272,14 @@ class GroupMoves(CellScenario):
         entrance = self.entrance_of(self.presses[0])
         with concurrent.futures.ThreadPoolExecutor() as pool:
             moving = pool.submit(self.move, entrance, self.request(390.0, velocity=20.0))
-            wait_for(lambda: all(self.moving()), "all move")
+            wait_for(lambda: all(self.moving()) and "STARTED" in self.steps(entrance), "all move, as the entrance knows")
             self.presses[1].sim.control("alarm 1 1")
             failed = time.monotonic_ns()
             self.all_stand()
             move = moving.result()
         self.assertEqual(move.state, pb.COMMAND_STATE_ERROR, move)
         self.assertTrue(move.cause.message.startswith("press-2: feeder"), move)
+        self.assertEqual(self.steps(entrance), ["PREPARED", "STARTED", "FAILED", "HALTED"])
         stops = self.stops(failed, (self.presses[0], self.presses[2]))
         self.assertLess(max(stops), HEARD + BUSY)
         print(f"stops at the other drives {stops} s after one had an alarm")
@@ -272,19 +289,24 @@ class GroupMoves(CellScenario):
         entrance = self.entrance_of(self.presses[0], {"press-3": gate.address})
         with concurrent.futures.ThreadPoolExecutor() as pool:
             moving = pool.submit(self.move, entrance, self.request(390.0, velocity=20.0))
-            wait_for(lambda: all(self.moving()), "all move")
+            wait_for(lambda: all(self.moving()) and "STARTED" in self.steps(entrance), "all move, as the entrance knows")
             gate.holds = lambda method, _: True
             lost = time.monotonic_ns()
             self.all_stand()
             move = moving.result()
         self.assertEqual(move.state, pb.COMMAND_STATE_UNKNOWN, move)
         self.assertTrue(move.cause.message.startswith("press-3: "), move)
+        self.assertEqual(self.steps(entrance), ["PREPARED", "STARTED", "FAILED", "UNKNOWN"])
         stops = self.stops(lost)
         self.assertLess(max(stops[:2]), LOST + BUSY)
         self.assertLess(stops[2], UNRENEWED + BUSY)  # by its own machine
 
     def test_axisctl_moves_them(self):
         entrance = self.entrance_of(self.presses[0])
+        following = Program("axisctl-events", [AXISCTL, "--cell", entrance.address, "events", "--follow"],
+                            self.presses[0].directory)
+        self.addCleanup(following.kill)
+        wait_for(lambda: "press-3 is present" in following.output(), "it follows")
         done = run([AXISCTL, "--cell", entrance.address, "group", "move", "press-1/feeder=20mm", "press-3/feeder=30mm@60mm/s",
                     "--clock-tolerance", "20ms", "--wait"], limit=60)
         self.assertEqual((done.returncode, done.stderr), (0, ""), done.stdout)
@@ -294,6 +316,12 @@ class GroupMoves(CellScenario):
                       limit=60)
         self.assertNotEqual(refused.returncode, 0)
         self.assertIn("press-2: feeder", refused.stderr)
+        lines = wait_for(lambda: re.findall(r"  cell  move of (press-1, press-\d) by \S+: (\w+)(.*)", following.output())
+                         if "failed" in following.output() else None, "it tells how they came along")
+        self.assertEqual([line[:2] for line in lines], [("press-1, press-3", "prepared"), ("press-1, press-3", "started"),
+                                                        ("press-1, press-3", "done"), ("press-1, press-2", "failed")])
+        self.assertRegex(lines[1][2], r"^, skew \d+\.\d+ ms, off by \d+\.\d+ ms at most$")
+        self.assertTrue(lines[3][2].startswith(": press-2: feeder"), lines)
         self.assertEqual(self.starts(), [1, 0, 1])
 
 

@@ -13,6 +13,7 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "api/cell/status.hpp"
 #include "axisd/v1/group_service.grpc.pb.h"
@@ -105,7 +106,9 @@ class GroupMovesTest : public ::testing::Test {
   RouteTable table_{"press-1"};
   Moving service_;
   std::unique_ptr<grpc::Server> server_;
-  GroupMoves moves_{io_.get_executor(), clock_, table_};
+  std::vector<v1::CellEvent> told_;
+  GroupMoves moves_{io_.get_executor(), clock_, table_,
+                    [this](v1::CellEvent event) { told_.push_back(std::move(event)); }};
   v1::MoveGroupRequest request_;
   std::optional<grpc::Status> answer_;
   v1::CellGroupMove move_;
@@ -188,6 +191,22 @@ TEST_F(GroupMovesTest, HowMovesEndIsCounted) {
   EXPECT_EQ(moves_.tally().done, 1U);
   EXPECT_EQ(moves_.tally().otherwise, 1U);
   EXPECT_EQ(moves_.tally().unknown + moves_.tally().refused, 0U);
+}
+
+TEST_F(GroupMovesTest, ItIsToldHowAMoveComesAlong) {
+  ask({.name = "anna", .role = CellRole::operator_});
+  EXPECT_TRUE(run_until([&] { return !told_.empty(); }));
+  service_.state = axisd::v1::COMMAND_STATE_DONE;
+  EXPECT_TRUE(run_until([&] { return answer_.has_value(); }));
+  ASSERT_EQ(told_.size(), 2U);
+  EXPECT_EQ(told_[0].kind(), v1::CELL_EVENT_KIND_GROUP_MOVE);
+  EXPECT_EQ(told_[0].group_move().step(), v1::GROUP_MOVE_STEP_STARTED);
+  EXPECT_EQ(told_[0].group_move().request_id(), "r-1");
+  EXPECT_EQ(told_[0].text(), "move of press-1 by anna: started");
+  EXPECT_EQ(told_[1].group_move().step(), v1::GROUP_MOVE_STEP_DONE);
+  ask({.name = "anna", .role = CellRole::operator_});
+  EXPECT_TRUE(answer_) << "it is known";
+  EXPECT_EQ(told_.size(), 2U) << "a repeat is no other move";
 }
 
 TEST_F(GroupMovesTest, NotMoreIsRememberedThanFits) {

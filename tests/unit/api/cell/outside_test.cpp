@@ -158,14 +158,39 @@ TEST(EventLog, GoesOnBehindTheCursor) {
 
 TEST(EventLog, TellsHowManyAreLost) {
   EventLog log("run-1");
-  for (std::size_t i = 0; i < EventLog::most + 10; ++i) log.add({});
+  for (std::size_t i = 0; i < EventLog::most_of_kind + 10; ++i) log.add({});
   std::uint64_t cursor = 0;
   auto response = log.after(cursor);
   EXPECT_EQ(response.lost(), 10U);
   EXPECT_EQ(response.events(0).sequence(), 11U);
-  EXPECT_EQ(response.events_size(), static_cast<int>(EventLog::most_at_once));
+  EXPECT_EQ(response.events_size(), EventLog::most_at_once);
   EXPECT_LT(response.cursor(), response.newest());
   EXPECT_EQ(log.after(cursor).lost(), 0U);
+}
+
+v1::CellEvent move_of(const std::string& client) {
+  v1::CellEvent event;
+  event.set_kind(v1::CELL_EVENT_KIND_GROUP_MOVE);
+  event.mutable_group_move()->set_client(client);
+  return event;
+}
+
+/// M32.
+TEST(EventLog, WhoFloodsItPushesOutOnlyTheirOwn) {
+  EventLog log("run-1");
+  v1::CellEvent birth;
+  birth.set_kind(v1::CELL_EVENT_KIND_MACHINE);
+  log.add(birth);
+  log.add(move_of("anna"));
+  for (std::size_t i = 0; i < 3 * EventLog::most_of_kind; ++i) log.add(move_of("boss"));
+  std::uint64_t cursor = 0;
+  const auto response = log.after(cursor);
+  EXPECT_EQ(response.events(0).kind(), v1::CELL_EVENT_KIND_MACHINE);
+  EXPECT_EQ(response.events(1).group_move().client(), "anna");
+  EXPECT_EQ(response.events(2).group_move().client(), "boss");
+  EXPECT_EQ(response.lost(), 2 * EventLog::most_of_kind + 1);
+  while (cursor < log.newest()) EXPECT_EQ(log.after(cursor).lost(), 0U);
+  EXPECT_EQ(log.after(cursor).events_size(), 0);
 }
 
 TEST(OpenCalls, NoCallerTakesThePlacesOfAllOthers) {
