@@ -12,13 +12,13 @@ namespace axisd {
 class AuditReader final : public AuditAccess {
  public:
   /// `log` writes into this directory, and outlives it.
-  AuditReader(std::filesystem::path directory, const store::AuditLog& log);
+  AuditReader(std::filesystem::path directory, store::AuditLog& log);
   void look(std::uint64_t after, WallTime since, Visit visit,
             std::function<void(Result<AuditSeen>)> done) override;
 
  private:
   const std::filesystem::path directory_;
-  const store::AuditLog* log_;
+  store::AuditLog* log_;
   BoundedWorker worker_;
 };
 

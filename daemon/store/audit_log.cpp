@@ -47,6 +47,14 @@ std::vector<RecoveredCommand> missing(std::vector<RecoveredCommand> earlier, con
   return found;
 }
 
+/// A command was accepted, or ended as it should. With an id of its request the command journal tells it,
+/// too.
+bool may_be_gathered(const AuditEntry& entry) {
+  const auto* event = std::get_if<Event>(&entry.content);
+  const auto* change = event == nullptr ? nullptr : std::get_if<CommandChange>(&event->content);
+  return change != nullptr && !change->command->request_id.empty() && !change->command->cause;
+}
+
 }  // namespace
 
 std::vector<RecoveredCommand> recovered(const JournalContent& content) {
@@ -72,7 +80,7 @@ AuditLog::~AuditLog() {
 }
 
 void AuditLog::add(AuditEntry entry) {
-  bool alone = false;
+  bool wakes = false;
   {
     const std::scoped_lock lock(mutex_);
     if (waiting_count_ >= options_.most_waiting) {
@@ -80,10 +88,23 @@ void AuditLog::add(AuditEntry entry) {
       return;
     }
     ++waiting_count_;
-    alone = added_.empty();
+    const bool hurries = !may_be_gathered(entry);
+    // Else the thread was woken before, and has not come yet, or gathers.
+    wakes = added_.empty() || (hurries && !in_a_hurry_);
+    in_a_hurry_ = in_a_hurry_ || hurries;
     added_.push_back(std::move(entry));
   }
-  if (alone) wake_.notify_one();  // else the thread was woken before, and has not come yet
+  if (wakes) wake_.notify_one();
+}
+
+void AuditLog::write_all() {
+  std::unique_lock lock(mutex_);
+  if (added_.empty() && taken_ == ended_) return;
+  // What was added before is part of the next take at the latest.
+  const auto awaited = added_.empty() ? taken_ : taken_ + 1;
+  in_a_hurry_ = in_a_hurry_ || !added_.empty();
+  wake_.notify_one();
+  written_.wait(lock, [&] { return ended_ >= awaited || trouble_; });
 }
 
 std::optional<Error> AuditLog::trouble() const {
@@ -96,6 +117,7 @@ std::optional<Error> AuditLog::trouble() const {
 
 void AuditLog::run() {
   tell(open());
+  written_.notify_all();
   std::unique_lock lock(mutex_);
   for (;;) {
     const auto something = [this] { return closing_ || !added_.empty(); };
@@ -105,12 +127,18 @@ void AuditLog::run() {
       wake_.wait_for(lock, *sync_by_ - monotonic_now(), something);
     else
       wake_.wait(lock, something);
+    if (!added_.empty() && !in_a_hurry_)
+      wake_.wait_for(lock, options_.gather_within, [this] { return closing_ || in_a_hurry_; });
     const bool last = closing_;
     auto added = std::exchange(added_, {});
+    in_a_hurry_ = false;
+    ++taken_;
     lock.unlock();
     std::ranges::move(added, std::back_inserter(waiting_));
     tell(open_ ? write() : open());
     lock.lock();
+    ended_ = taken_;
+    written_.notify_all();
     if (last && (added_.empty() || trouble_)) break;
   }
   if (sync_by_) (void)files_.sync();

@@ -50,14 +50,17 @@ struct AuditOptions {
   /// What is written need not be durable sooner: commands that start something are in the journal before
   /// that.
   Duration sync_within = std::chrono::seconds(1);
+  /// What the command journal tells, too, is written with others that come within that time. Each write costs
+  /// a wake of the thread.
+  Duration gather_within = std::chrono::milliseconds(100);
   std::size_t most_waiting = 20'000;  ///< entries that the disk has not taken yet
 };
 
 /// What the command journal tells of earlier runs.
 [[nodiscard]] std::vector<RecoveredCommand> recovered(const JournalContent& content);
 
-/// The audit, written by a thread of its own: at once, and made durable in batches. Thread: any (created and
-/// destroyed by one).
+/// The audit, written by a thread of its own: at once, but for what a start of the daemon would recover from
+/// the command journal, and made durable in batches. Thread: any (created and destroyed by one).
 class AuditLog final : public AuditSink {
  public:
   explicit AuditLog(AuditOptions options);
@@ -66,6 +69,8 @@ class AuditLog final : public AuditSink {
   ~AuditLog() override;
 
   void add(AuditEntry entry) override;
+  /// Blocks until all that was added is written, or the disk does not take it. Thread: any but the core.
+  void write_all();
   /// Why nothing can be written at present; nothing: all is well.
   [[nodiscard]] std::optional<Error> trouble() const;
   /// Number of the last record that was written; 0: there is none.
@@ -92,8 +97,11 @@ class AuditLog final : public AuditSink {
 
   std::atomic<std::uint64_t> newest_ = 0;
   mutable std::mutex mutex_;  ///< held for a move only: the core waits for it
-  std::condition_variable wake_;
+  std::condition_variable wake_, written_;
   std::deque<AuditEntry> added_;   // guarded by mutex_
+  bool in_a_hurry_ = false;        // guarded by mutex_: what was added waits for nothing more
+  std::uint64_t taken_ = 0;        // guarded by mutex_: so often the thread has taken what was added, and
+  std::uint64_t ended_ = 0;        // guarded by mutex_: written it, or tried to
   std::size_t waiting_count_ = 0;  // guarded by mutex_: added_ and waiting_
   std::uint64_t left_out_ = 0;     // guarded by mutex_
   std::optional<Error> trouble_;   // guarded by mutex_

@@ -47,6 +47,13 @@ RecoveredCommand earlier(const std::string& id, CommandState state, bool sent) {
   return {.command = {.id = id, .axis = "x", .request_id = "r", .client = "c", .state = state}, .sent = sent};
 }
 
+AuditEntry change(std::string request_id, CommandState state) {
+  Command command{.id = "i", .axis = "x", .request_id = std::move(request_id), .client = "c", .state = state};
+  if (state == CommandState::error) command.cause = Error{.message = "failed"};
+  return {.content = Event{.axis = "x",
+                           .content = CommandChange{.command = std::make_shared<const Command>(command)}}};
+}
+
 class AuditLogTest : public testing::Test {
  protected:
   std::unique_ptr<AuditLog> open(std::vector<RecoveredCommand> commands = {}, std::size_t most = 1'000) {
@@ -55,6 +62,7 @@ class AuditLogTest : public testing::Test {
                                                    .instance_id = "i",
                                                    .revision = "r1",
                                                    .earlier = std::move(commands),
+                                                   .gather_within = std::chrono::hours(1),
                                                    .most_waiting = most});
   }
   /// Of the only file.
@@ -83,6 +91,48 @@ TEST_F(AuditLogTest, WhatIsAddedIsWrittenAtOnceInOrder) {
   log->add(call("more"));
   log.reset();
   EXPECT_EQ(lines().at(600), "601 r1 more");
+}
+
+/// A kill takes nothing from the audit that the journal does not tell.
+TEST_F(AuditLogTest, WhatTheJournalTellsTooIsWrittenWithWhatComesNext) {
+  auto log = open();
+  log->add(call("first"));
+  wait_for([&] { return log->newest() == 1; });
+  log->add(change("r", CommandState::accepted));
+  log->add(change("r", CommandState::done));
+  EXPECT_EQ(log->newest(), 1);
+  log->add(call("next"));
+  wait_for([&] { return log->newest() == 4; });
+  EXPECT_THAT(lines(), ElementsAre("1 r1 first", "2 r1 event", "3 r1 event", "4 r1 next"));
+}
+
+TEST_F(AuditLogTest, WhatTheJournalDoesNotTellIsWrittenAtOnce) {
+  auto log = open();
+  log->add(change("", CommandState::accepted));
+  wait_for([&] { return log->newest() == 1; });
+  log->add(change("r", CommandState::error));
+  wait_for([&] { return log->newest() == 2; });
+}
+
+TEST_F(AuditLogTest, WhoReadsFindsWhatWasAddedBefore) {
+  auto log = open();
+  log->write_all();
+  for (std::uint64_t i = 1; i <= 20; ++i) {
+    log->add(change("r", CommandState::accepted));
+    log->write_all();
+    EXPECT_EQ(log->newest(), i);
+  }
+  log->add(change("r", CommandState::accepted));
+  log.reset();
+  EXPECT_EQ(lines().size(), 21);
+}
+
+TEST_F(AuditLogTest, NobodyWaitsForADiskThatFails) {
+  temporary_.write("audit", "in the place of the directory");
+  auto log = open();
+  log->add(change("r", CommandState::accepted));
+  log->write_all();
+  EXPECT_TRUE(log->trouble());
 }
 
 TEST_F(AuditLogTest, EachRecordNamesTheConfigurationThatIsServed) {
