@@ -81,7 +81,9 @@ Result<void> JournalFile::load(JournalLoad load, WallTime now) {
 }
 
 JournalFile::JournalFile(std::unique_ptr<JournalDisk> disk, Executor core, JournalOptions options)
-    : core_(std::move(core)), options_(std::move(options)), disk_(std::move(disk)) {}
+    : core_(std::move(core)), options_(std::move(options)), disk_(std::move(disk)) {
+  of_core_->journal = this;
+}
 
 std::string boot_id() {
   std::ifstream file("/proc/sys/kernel/random/boot_id");
@@ -97,6 +99,7 @@ void JournalFile::look_at_clock() {
 }
 
 JournalFile::~JournalFile() {
+  of_core_->journal = nullptr;
   if (!thread_.joinable()) return;
   {
     const std::scoped_lock lock(mutex_);
@@ -107,12 +110,17 @@ JournalFile::~JournalFile() {
 }
 
 std::optional<Error> JournalFile::trouble() const {
-  if (const auto own = trouble_->load()) return *own;
+  if (const auto own = of_core_->trouble.load()) return *own;
   return options_.other_trouble ? options_.other_trouble() : std::nullopt;
 }
 
+/// Mostly its `sending` follows before the core does anything else: both are then one write, and wake the
+/// thread once.
 void JournalFile::accepted(const Command& command, std::string digest) {
-  enqueue({.line = AcceptedLine{.command = command, .digest = std::move(digest)}});
+  add({.line = AcceptedLine{.command = command, .digest = std::move(digest)}});
+  post(core_, [of_core = of_core_] {
+    if (of_core->journal != nullptr) of_core->journal->wake_.notify_one();
+  });
 }
 
 void JournalFile::attached(const std::string& command, RequestKey request, Callback done) {
@@ -145,12 +153,14 @@ Result<void> JournalFile::note(StateLine line) {
 }
 
 void JournalFile::enqueue(Pending pending) {
-  {
-    // Held by the writer only for a swap: the core does not wait for the disk.
-    const std::scoped_lock lock(mutex_);
-    pending_.push_back(std::move(pending));
-  }
+  add(std::move(pending));
   wake_.notify_one();
+}
+
+void JournalFile::add(Pending pending) {
+  // Held by the writer only for a swap: the core does not wait for the disk.
+  const std::scoped_lock lock(mutex_);
+  pending_.push_back(std::move(pending));
 }
 
 void JournalFile::run() {
@@ -281,7 +291,7 @@ Result<void> JournalFile::rewrite() {
 
 void JournalFile::tell(const std::optional<Error>& trouble) {
   const auto told = trouble ? boost::make_shared<const Error>(*trouble) : nullptr;
-  post(core_, [state = trouble_, told] { state->store(told); });
+  post(core_, [of_core = of_core_, told] { of_core->trouble.store(told); });
 }
 
 }  // namespace axisd::store

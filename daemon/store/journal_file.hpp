@@ -91,6 +91,7 @@ class JournalFile final : public CommandJournal, public StateWitness {
   void look_at_clock();
   [[nodiscard]] Result<void> settle();
   void enqueue(Pending pending);
+  void add(Pending pending);
   void run();
   void commit(std::vector<Pending> batch);
   [[nodiscard]] Result<void> write(const std::vector<Pending>& batch);
@@ -105,8 +106,11 @@ class JournalFile final : public CommandJournal, public StateWitness {
   const JournalOptions options_;
   JournalContent loaded_;
   /// Written by the core, in its turn with the callbacks; outlives this with the handlers that were posted.
-  std::shared_ptr<boost::atomic_shared_ptr<const Error>> trouble_ =
-      std::make_shared<boost::atomic_shared_ptr<const Error>>();
+  struct OfCore {
+    boost::atomic_shared_ptr<const Error> trouble;
+    JournalFile* journal = nullptr;  ///< nullptr: it is gone
+  };
+  std::shared_ptr<OfCore> of_core_ = std::make_shared<OfCore>();
 
   // Of the writing thread, once it runs.
   std::unique_ptr<JournalDisk> disk_;

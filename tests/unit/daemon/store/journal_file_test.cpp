@@ -8,6 +8,7 @@
 #include <boost/asio/executor_work_guard.hpp>
 #include <boost/asio/io_context.hpp>
 #include <csignal>
+#include <optional>
 #include <set>
 #include <thread>
 
@@ -133,6 +134,17 @@ TEST_F(JournalFileTest, CommandsAreKnownAfterARestart) {
     EXPECT_EQ(content.commands[1].attached, (std::vector<RequestKey>{{"c", "more", "two"}}));
     EXPECT_FALSE(content.doubtful_until);
   }
+}
+
+TEST_F(JournalFileTest, WhatIsAcceptedIsWrittenAlsoWhereNothingFollows) {
+  auto journal = open();
+  journal->accepted(command("1"), "one");
+  core_.poll();
+  while (!text().contains("accepted id=1 ")) std::this_thread::yield();
+  journal->accepted(command("2"), "two");
+  journal.reset();
+  EXPECT_THAT(text(), HasSubstr("accepted id=2 "));
+  core_.poll();
 }
 
 /// An end without its sync costs a restart a look at the drive, and nothing else.
@@ -361,13 +373,13 @@ TEST_F(JournalFileTest, WhatWasDurableSurvivesAKill) {
       for (unsigned char i = 0; i < 200; ++i) {
         const auto id = std::to_string(round) + "-" + std::to_string(i);
         (*journal)->accepted(command(id), "d");
-        bool durable = false;
+        std::optional<bool> durable;
         (*journal)->sending(command(id), {},
                             [&](const Result<void>& result) { durable = result.has_value(); });
         auto work = boost::asio::make_work_guard(core);
         core.restart();
-        core.run_one();
-        if (!durable || write(pipes[1], &i, 1) != 1) _exit(1);
+        while (!durable) core.run_one();
+        if (!*durable || write(pipes[1], &i, 1) != 1) _exit(1);
       }
       _exit(0);
     }
