@@ -128,12 +128,11 @@ Error Axis::moved_before_start() const {
 /// What was true at its acceptance, or before the disk was waited for, may have changed. False: the activity
 /// has ended, and nothing was sent.
 bool Axis::may_start(Activity& activity) {
-  auto cause = error(Reason::not_trusted, "the position was lost before the move could start",
-                     "home the axis, or set its position");
-  if (found_in_motion())
-    cause = moved_before_start();
-  else if (!activity.plan.trusted || tracker_.trust() != PositionTrust::unknown)
-    return true;
+  const bool moved = found_in_motion();
+  if (!moved && (!activity.plan.trusted || tracker_.trust() != PositionTrust::unknown)) return true;
+  auto cause = moved ? moved_before_start()
+                     : error(Reason::not_trusted, "the position was lost before the move could start",
+                             "home the axis, or set its position");
   tell_part(activity, cause);
   finish(activity, [&](CommandRecord& command) { command.error(std::move(cause)); });
   return false;
