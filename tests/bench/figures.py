@@ -1,4 +1,5 @@
 """What the benchmarks have in common: running programs, their CPU time, tables."""
+import collections
 import contextlib
 import os
 import pathlib
@@ -39,6 +40,18 @@ def cpu_seconds_by_ticks(pid):
     """The same, of threads that have ended, too; by the kernel's ticks."""
     words = pathlib.Path(f"/proc/{pid}/stat").read_text(encoding="ascii").rpartition(")")[2].split()
     return (int(words[11]) + int(words[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def by_thread(pid):
+    """Name of a thread, or of several -> CPU time, and how often it has gone to sleep, and so was woken."""
+    found = collections.defaultdict(lambda: (0.0, 0))
+    for task in pathlib.Path(f"/proc/{pid}/task").iterdir():
+        ran = int((task / "schedstat").read_text(encoding="ascii").split()[0]) / 1e9
+        name, _, status = (task / "status").read_text(encoding="utf-8").partition("\n")
+        slept = int(status.partition("\nvoluntary_ctxt_switches:")[2].split(maxsplit=1)[0])
+        name = name.removeprefix("Name:").strip()
+        found[name] = (found[name][0] + ran, found[name][1] + slept)
+    return found
 
 
 def spread(values, digits=0):

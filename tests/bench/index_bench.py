@@ -4,7 +4,7 @@ apart or in one frame, and python3-pymodbus, in turns at the same simulated driv
 1 where a command expired, where 1 % of the starts came later than axisd publishes, or where a bar at the end is not met.
 
     index_bench.py BUILD [--axes N|N/DRIVES ...] [--baud BAUD ...] [--lines LINES/AXES ...] [--rounds N] [--seconds S] [--wire]
-                   [--report-only]
+                   [--threads] [--report-only]
 """
 import argparse
 import contextlib
@@ -20,7 +20,7 @@ import time
 
 import index_plot
 import index_wire
-from figures import cpu_seconds, go_first, running, spread, table
+from figures import by_thread, go_first, running, spread, table
 from rtu_cell import SERVER, Cell, Line
 
 HERE, THERE, PULSES = 0.1, 0.2, 2000  # mm, and the pulses of one as the drives of Cell count
@@ -48,13 +48,13 @@ class Case:
         return str(self.axes) if self.axes == self.drives else f"{self.axes} of {self.drives}"
 
 
-class Syncs:
-    """How often a program has the disk confirm something."""
+class Counted:
+    """How often a program has the disk confirm something (`what`: sync), or allocates memory (allocation)."""
 
-    def __init__(self, build, path):
+    def __init__(self, build, path, what):
         path.write_bytes(bytes(8))
-        library = f"{build}/tests/libbench_sync_counter.so"
-        self.environment = {**os.environ, "LD_PRELOAD": library, "AXISD_SYNC_COUNT": str(path)}
+        library = f"{build}/tests/libbench_{what}_counter.so"
+        self.environment = {**os.environ, "LD_PRELOAD": library, "AXISD_COUNT": str(path)}
         with path.open("r+b") as file:
             self.shared = mmap.mmap(file.fileno(), 8)
 
@@ -62,17 +62,21 @@ class Syncs:
         return int.from_bytes(self.shared[:8], sys.byteorder)
 
 
-def look(lines, case, pid, seconds, syncs=None):
+def look(lines, case, pid, seconds, counted=None):
     """What was done in `seconds`: the rate is that of all lines, the rest that of the first; and its requests."""
-    begin, cpu, synced = time.monotonic(), cpu_seconds(pid), syncs.count() if syncs else 0
+    begin, before, count = time.monotonic(), by_thread(pid), counted.count() if counted else 0
     time.sleep(seconds)
-    end, cpu, synced = time.monotonic(), cpu_seconds(pid) - cpu, (syncs.count() if syncs else 0) - synced
+    end, after, count = time.monotonic(), by_thread(pid), counted.count() - count if counted else 0
+    threads = {name: (cpu - before[name][0], woken - before[name][1]) for name, (cpu, woken) in after.items()}
+    cpu, woken = map(sum, zip(*threads.values()))
     requests = [index_wire.requests_of(line, line.frames(begin, end)) for line in lines]
     found = [index_wire.figures_of(each, end - begin, case.axes) for each in requests]
     rate = sum(each["rate"] for each in found)
     moves = max(sum(each["moves"] for each in found), 1)
     return found[0] | {"rate": rate, "cpu": cpu / moves * 1e3, "core": cpu / (end - begin) * 100,
-                       "syncs": synced / moves}, requests[0]
+                       "wakes": woken / moves, "counted": count / moves,
+                       "threads": {name: (ran / moves * 1e3, slept / moves) for name, (ran, slept) in threads.items()}
+                       }, requests[0]
 
 
 def lap(line, case):
@@ -96,18 +100,18 @@ def client_figures(text):
     return found
 
 
-def with_axisd(build, lines, case, seconds, drive=""):
-    """`case`: of each line; `drive`: keys of each axis's drive."""
+def with_axisd(build, lines, case, seconds, drive="", count="sync"):
+    """`case`: of each line; `drive`: keys of each axis's drive; `count`: as of Counted."""
     line = lines[0]
-    syncs = Syncs(build, line.directory / "syncs")
+    counted = Counted(build, line.directory / "count", count)
     cell = Cell(build, lines, None, drive=drive)
-    with cell.online(env=syncs.environment) as pid:
+    with cell.online(env=counted.environment) as pid:
         subprocess.run([f"{build}/tests/bench_command_client", SERVER, "ready"], check=True)
         settle, seconds = SETTLE + lap(line, case), seconds + 2 * lap(line, case)
         words = [SERVER, str(case.axes * len(lines)), str(HERE), str(THERE), str(settle + seconds + SETTLE)]
         with subprocess.Popen([f"{build}/tests/bench_index_client", *words], stdout=subprocess.PIPE, text=True) as client:
             time.sleep(settle)
-            found, requests = look(lines, case, pid, seconds, syncs)
+            found, requests = look(lines, case, pid, seconds, counted)
             printed = client.communicate()[0]
         if client.returncode != 0:
             sys.exit(f"index_bench.py: bench_index_client ended with {client.returncode}")
@@ -144,6 +148,9 @@ def measure(build, given, baud, case):
                 if given.wire and number == 0:
                     index_wire.print_move(f"{baud} bit/s, {case}, {PROGRAMS[name]}", requests, node=1)
             print(".", end="", file=sys.stderr, flush=True)
+        # In a turn of its own, as counting takes time.
+        counts, _ = with_axisd(build, [line], case, given.seconds, count="allocation")
+        found["axisd"]["allocations"] = [counts["counted"]]
     return found
 
 
@@ -199,7 +206,7 @@ def ratios(found, name):
 def print_rates(baud, cases):
     kinds = ("state", "canary", "block", "trigger", "one", "other", "resting")
     rows = [["axes", "", "moves/s", "its yardstick", "transactions a move", *kinds, "line used, %", "CPU a move, ms",
-             "least share"]]
+             "wakes a move", "allocations a move", "least share"]]
     for case, found in cases.items():
         for name, title in PROGRAMS.items():
             figures = found[name]
@@ -207,6 +214,7 @@ def print_rates(baud, cases):
             beside = spread(ratios(found, name), 2) if name in YARDSTICKS else ""
             rows.append([str(case), title, spread(figures["rate"], 1), beside, f"{all_of_them:.1f}",
                          *(median(figures, kind, 2) for kind in kinds), median(figures, "used"), median(figures, "cpu", 2),
+                         median(figures, "wakes"), median(figures, "allocations", 0) if "allocations" in figures else "",
                          median(figures, "share", 2)])
     print(f"\n{baud} bit/s: axes of one line that index at once; min / median / max of the rounds, else medians; `resting`: "
           "whatever was asked of other axes; `least share`: of the axis that moved least, 1 is even")
@@ -225,7 +233,7 @@ def print_commands(baud, cases):
         counts = (f"{sum(figures[what]):.0f}" for what in ("done", "expired", "refused", "otherwise"))
         rows.append([str(case), PROGRAMS[name], *counts, median(figures, "call median"), median(figures, "call p99"),
                      median(figures, "start median"), f"{late:.1f}", f"{max(figures['start longest']):.1f}", f"{bound:.1f}",
-                     "yes" if met else "NO", median(figures, "syncs", 2)])
+                     "yes" if met else "NO", median(figures, "counted", 2)])
     print(f"\n{baud} bit/s: commands of axisd, all rounds; times of those that were done; 99 % and longest of acceptance to "
           "start are those of the worst round")
     table(rows)
@@ -244,6 +252,16 @@ def print_bars(baud, cases):
     print(f"\n{baud} bit/s: the bars, medians of the rounds; not judged where other axes are on the line, too")
     table(rows)
     return all(row[-1] != "NO" for row in rows)
+
+
+def print_threads(baud, cases):
+    rows = [["axes", "", "thread", "CPU a move, ms", "wakes a move"]]
+    for case, name in ((case, name) for case in cases for name in YARDSTICKS):
+        threads = cases[case][name]["threads"][-1]
+        rows += [[str(case), PROGRAMS[name], thread, f"{cpu:.3f}", f"{woken:.2f}"]
+                 for thread, (cpu, woken) in sorted(threads.items(), key=lambda entry: -entry[1][0]) if cpu >= 0.001]
+    print(f"\n{baud} bit/s: threads of axisd, last round")
+    table(rows)
 
 
 def plot(path, found):
@@ -270,6 +288,7 @@ def main():
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--seconds", type=float, default=4, help="of each turn, and two laps of all axes")
     parser.add_argument("--wire", action="store_true", help="print one move of each program, frame by frame")
+    parser.add_argument("--threads", action="store_true", help="print CPU time and wakes of each of axisd's threads")
     parser.add_argument("--report-only", action="store_true", help="ends with 0 whatever was seen")
     given = parser.parse_args()
     build, within = os.path.abspath(given.build), True
@@ -279,6 +298,8 @@ def main():
         print_rates(baud, cases)
         within = print_commands(baud, cases) and within
         within = print_bars(baud, cases) and within
+        if given.threads:
+            print_threads(baud, cases)
     plot(pathlib.Path(build) / "bench" / "index.svg", found)
     within = print_lines(build, given) and within
     return 0 if within or given.report_only else 1
