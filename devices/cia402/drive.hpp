@@ -216,7 +216,7 @@ class Cia402Drive final : public Drive {
   Task<Result<void>> read_quick_stop_ramp(SdoOptions options);
   /// Its own ramp is softer than that of the motion.
   [[nodiscard]] bool brakes_softer_in_quick_stop() const;
-  Task<Result<void>> send_stop(bool quick, KnownWords::Seen motion);
+  Task<Result<void>> send_stop(bool quick);
   Task<bool> turns(SdoOptions options);
   Task<Result<void>> choose_mode_soon(OperationMode mode, SdoOptions options);
   Task<Result<void>> halt_again(std::uint16_t bits, SdoOptions options);

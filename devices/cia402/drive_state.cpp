@@ -95,7 +95,8 @@ Duration Cia402Drive::pdo_patience(TimePoint now) const {
   const auto period = bus_->settings().sync_period;
   const auto wanted = pdos.late() ? std::max<Duration>(3 * period + reply, longest_pdo_wait)
                                   : std::min<Duration>(2 * period + reply, longest_pdo_wait);
-  if (!alive(now) || words_.may_brake()) return wanted;
+  const bool stopping = words_.halt() == KnownWords::Halt::braking;
+  if (!alive(now) || stopping) return wanted;
   return std::max(wanted, std::min<Duration>(cycles_alive * period + reply, longest_pdo_wait_alive));
 }
 

@@ -149,20 +149,18 @@ std::optional<Duration> Cia402Drive::quick_stop_time(int rpm) const {
 
 Task<Result<void>> Cia402Drive::stop(StopKind kind) {
   stops_.begin_stop();
-  const bool unseen = stops_.triggers() || motion_.state() == MotionWatch::State::begun;
   motion_.stop(stops_.triggers() || homing_.active());
   homing_.stop(words_.homes());
   bus_->purge_superseded(node_.id(), homing_.gate());
   give_up_common_start();
-  const auto sent = co_await send_stop(kind == StopKind::quick_stop,
-                                       unseen ? KnownWords::Seen::nothing_yet : KnownWords::Seen::enough);
+  const auto sent = co_await send_stop(kind == StopKind::quick_stop);
   stops_.end_stop(clock_->now());
   co_return sent;
 }
 
 /// Works on a node of which nothing is known, and never changes the power stage: bits 0 to 3 stay as the
 /// drive has them. Never bit 2 (M12): without 605Ah and 6085h nobody knows how the drive would stop.
-Task<Result<void>> Cia402Drive::send_stop(bool quick, KnownWords::Seen motion) {
+Task<Result<void>> Cia402Drive::send_stop(bool quick) {
   const SdoOptions urgent{.transaction_class = TransactionClass::stop};
   const SdoOptions first{.transaction_class = TransactionClass::stop, .timeout = urgent_reply_limit};
   co_await wake_if_stopped();
@@ -198,7 +196,7 @@ Task<Result<void>> Cia402Drive::send_stop(bool quick, KnownWords::Seen motion) {
   auto sent = co_await write_control(with_halt(bits), urgent);
   if (known && quick) co_await zero_velocity(urgent);
   // Under a halt that stands already bit 8 has no edge: what a terminal has started since goes on, and so
-  // does the ramp under a quick stop, and what was triggered before, but begins only now.
+  // does the ramp under a quick stop.
   const bool stronger = quick && !words_.halt_is_quick();
   const bool unseen = words_.halt() != KnownWords::Halt::braking;
   const bool operates = bits == control_word(Command::enable_operation);
@@ -208,9 +206,8 @@ Task<Result<void>> Cia402Drive::send_stop(bool quick, KnownWords::Seen motion) {
   if ((under_halt || switched_on) && co_await turns(urgent)) {
     sent = co_await halt_again(bits, urgent);
     if (sent) was_halted = false;
-    motion = KnownWords::Seen::enough;
   }
-  if (!was_halted) words_.halted(clock_->now(), quick, motion);
+  if (!was_halted) words_.halted(clock_->now(), quick);
   co_return sent;
 }
 

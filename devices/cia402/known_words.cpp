@@ -83,14 +83,14 @@ KnownWords::Control KnownWords::knows() const {
   return bits_ ? Control::state_bits : Control::unknown;
 }
 
-void KnownWords::halted(TimePoint at, bool quick, Seen motion) {
-  halt_ = motion == Seen::enough ? Halt::braking : Halt::early;
+void KnownWords::halted(TimePoint at, bool quick) {
+  halt_ = Halt::braking;
   halt_since_ = at;
   halt_quick_ = quick;
 }
 
 void KnownWords::see_rest(TimePoint asked_at) {
-  if (may_brake() && asked_at >= halt_since_) halt_ = Halt::rested;
+  if (halt_ == Halt::braking && asked_at >= halt_since_) halt_ = Halt::rested;
 }
 
 bool KnownWords::held_halt(TimePoint asked_at) const {

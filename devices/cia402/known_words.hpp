@@ -26,18 +26,13 @@ namespace axisd::cia402 {
 ///
 /// The halt (bit 8), by its last edge (Halt):
 ///
-///   any            -- halted() -------------------------------> braking
-///   any            -- halted(), before its motion was seen ---> early
-///   braking, early -- see_rest() -----------------------------> rested
-///   any            -- executed(), a word without it; forget_halt() -> none
-///
-/// A drive may begin after an early halt, which then is no edge to it.
+///   any     -- halted() ---------------------------------------> braking
+///   braking -- see_rest() -------------------------------------> rested
+///   any     -- executed(), a word without it; forget_halt() ---> none
 class KnownWords {
  public:
   enum class Control : std::uint8_t { unknown, state_bits, whole };
-  enum class Halt : std::uint8_t { none, early, braking, rested };
-  /// What was seen of the motion that a halt ends.
-  enum class Seen : std::uint8_t { nothing_yet, enough };
+  enum class Halt : std::uint8_t { none, braking, rested };
   /// What the mode that is set was chosen for.
   enum class ModeUse : std::uint8_t { motion, neutral };
   /// Number of a write: a later one has another.
@@ -82,13 +77,11 @@ class KnownWords {
 
   // Halt.
   /// `quick`: without a ramp.
-  void halted(TimePoint at, bool quick, Seen motion = Seen::enough);
+  void halted(TimePoint at, bool quick);
   /// The motor rests, by a reading that was asked for then.
   void see_rest(TimePoint asked_at);
   void forget_halt() { halt_ = Halt::none; }
   [[nodiscard]] Halt halt() const { return halt_; }
-  /// It was not seen at rest since.
-  [[nodiscard]] bool may_brake() const { return halt_ == Halt::early || halt_ == Halt::braking; }
   [[nodiscard]] bool halt_is_quick() const { return halt_ != Halt::none && halt_quick_; }
   /// Bit 8 stood in the drive when it was asked.
   [[nodiscard]] bool held_halt(TimePoint asked_at) const;

@@ -125,34 +125,6 @@ TEST(M13, AStopEndsWhatATerminalStartedUnderHalt) {
   }
 }
 
-/// A drive that begins late may see no edge of the halt that came before.
-TEST(M13, AStopEndsWhatBeginsBetweenItsHaltAndTheFirstReading) {
-  for (const auto kind : {StopKind::halt, StopKind::stop, StopKind::quick_stop})
-    for_each_reading({.polled = true,
-                      .adjust_drive = [](auto& node) { node.eeprom[0x206800] = 0; },  // no filter of X3
-                      .limits = false,
-                      .adjust = add_jog},
-                     {{"halt_release_resumes"}, {"pdo_parameters_read_only"}, {"mode_change_keeps_setpoint"}},
-                     [kind](const CanRigOptions& options) {
-                       CanRig rig(options);
-                       rig.ready();
-                       (void)rig.submit(MoveRelativeRequest{.distance = 900});
-                       ASSERT_TRUE(rig.run_until([&] { return rig.drive->starts() > 0; }, 2s));
-                       const auto stop = rig.submit(StopRequest{.kind = kind});
-                       const auto halted = [&] {
-                         return (rig.drive->peek(0x604000) & 0x100U) != 0 && !rig.drive->shaft_moving();
-                       };
-                       ASSERT_TRUE(rig.run_until(halted, 1s));
-                       rig.touch([](auto& node) { node.set_input("X3", true); });
-                       ASSERT_TRUE(rig.drive->shaft_moving());
-                       rig.run(200ms);
-                       EXPECT_FALSE(rig.drive->shaft_moving());
-                       EXPECT_EQ(rig.drive->peek(0x604000), 0x010FU);
-                       ASSERT_TRUE(rig.run_until([&] { return stop->has_ended(); }, 5s));
-                       EXPECT_EQ(stop->value().state, CommandState::done) << describe(stop->value());
-                     });
-}
-
 /// A stop cuts the reading that is under way: that no answer came shows all the same.
 TEST(M7, WhoStopsASilentNodeAgainAndAgainDoesNotKeepItOnline) {
   for (const bool polled : {false, true})

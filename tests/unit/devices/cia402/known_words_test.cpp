@@ -134,21 +134,6 @@ TEST_F(Words, AHaltBrakesUntilTheMotorWasSeenAtRestUnderIt) {
   EXPECT_EQ(words_.halt(), Halt::rested);
 }
 
-TEST_F(Words, AHaltFromBeforeItsMotionWasSeenIsEarlyUntilTheMotorRestsOrGetsAnotherEdge) {
-  words_.halted(at(10), false, KnownWords::Seen::nothing_yet);
-  EXPECT_EQ(words_.halt(), Halt::early);
-  EXPECT_TRUE(words_.may_brake());
-  EXPECT_TRUE(words_.held_halt(at(10)));
-  words_.see_rest(at(9));
-  EXPECT_EQ(words_.halt(), Halt::early);
-  words_.see_rest(at(10));
-  EXPECT_EQ(words_.halt(), Halt::rested);
-  EXPECT_FALSE(words_.may_brake());
-  words_.halted(at(20), false, KnownWords::Seen::nothing_yet);
-  words_.halted(at(30), false);
-  EXPECT_EQ(words_.halt(), Halt::braking);
-}
-
 TEST_F(Words, AWordWithoutItMayHaveEndedTheHalt) {
   words_.halted(at(10), true);
   words_.executed(halted);
