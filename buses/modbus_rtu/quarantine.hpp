@@ -19,8 +19,9 @@ inline constexpr int quarantine_share = 50;
 inline constexpr Duration quarantine_longest_hold = std::chrono::seconds(2);
 inline constexpr int quarantine_common_share = 25;
 /// A drive to which a stop is owed may be turning its motor: it is probed so often that this costs the line
-/// no more than one part in so many (12.5 %) for all such nodes together, for so long after the first of its
-/// stops was lost. Whoever is gone for good then costs as little as any other.
+/// no more than one part in so many (12.5 %) for all such nodes together, or what each costs as any other,
+/// for so long after the first of its stops was lost. Whoever is gone for good then costs as little as any
+/// other.
 inline constexpr int quarantine_owed_share = 8;
 inline constexpr Duration quarantine_owed_time = std::chrono::seconds(30);
 /// First wait between two probes; it doubles up to what the share demands.
@@ -49,7 +50,7 @@ class Quarantine {
     std::uint64_t entered = 0;  ///< times that it was put there; kept by forget()
     bool answered_once = false;
     bool stop_in_vain = false;              ///< a stop was not answered, and nothing was since
-    std::optional<TimePoint> owed_since{};  ///< a stop that is owed was not, for the first time since then
+    std::optional<TimePoint> owed_since{};  ///< the first of these stops was lost then
     [[nodiscard]] bool quarantined() const { return level > 0 && silent > 0; }
   };
 

@@ -206,7 +206,9 @@ bool Axis::is_at(const PositionTracker::Target& target) const {
 }
 
 bool Axis::is_near(const PositionTracker::Target& target) const {
-  return std::abs(tracker_.counter() - target.counter) <= target_tolerance() + drive_->position_window() / 2;
+  constexpr std::int64_t noise_counts = 2;
+  const auto wavering = std::max<std::int64_t>(drive_->position_window() / 2, noise_counts);
+  return std::abs(tracker_.counter() - target.counter) <= target_tolerance() + wavering;
 }
 
 Duration Axis::settling() const {

@@ -10,6 +10,9 @@ namespace {
 constexpr Duration overrun_margin = std::chrono::seconds(1);
 /// A motion that no sample can tell from noise is over so long after its predicted end, if it began at once.
 constexpr Duration unseen_margin = std::chrono::milliseconds(100);
+/// A shaft that was seen in its window, and has been beside it at most since, may be there by a later
+/// reading.
+constexpr Duration longest_wavering = std::chrono::seconds(2);
 
 }  // namespace
 
@@ -47,7 +50,10 @@ MotionMachine::State MotionMachine::look(const Reading& reading) {
   // Only who was asked after the window and still rests has not started: a silent drive may well run.
   if (state_ == State::starting && reading.asked_at >= motion_.since + start_window)
     return state_ = State::did_not_start;
-  if (reading.asked_at >= latest()) state_ = State::took_too_long;
+  // Where it is there in time but for its settling, the next reading tells: on a full line that may take
+  // long.
+  const bool is_there = reading.at_target && !reading.moving;
+  if (reading.asked_at >= latest() && !is_there) state_ = State::took_too_long;
   return state_;
 }
 
@@ -64,8 +70,9 @@ MotionMachine::State MotionMachine::judge_rest(const Reading& reading) {
     return State::settling;
   }
   if (!reading.near_target) there_since_.reset();
-  const bool settles = !reading.held_back && reading.asked_at - *rests_since_ < motion_.settling;
-  return settles ? State::settling : State::rests_elsewhere;
+  const bool wavers = there_since_ && reading.asked_at - *there_since_ < longest_wavering;
+  const bool settles = wavers || reading.asked_at - *rests_since_ < motion_.settling;
+  return settles && !reading.held_back ? State::settling : State::rests_elsewhere;
 }
 
 StartReadback::State StartReadback::look(const std::optional<Reading>& reading, TimePoint now) {

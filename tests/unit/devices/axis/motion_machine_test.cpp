@@ -103,6 +103,34 @@ TEST(MotionMachine, WhatWaversAtTheEdgeOfItsWindowHasArrived) {
   EXPECT_EQ(followed.arrives(60ms), State::arrived);
 }
 
+/// On a full line a reading comes a second after the one before.
+TEST(MotionMachine, WhatIsReadSeldomArrivesAllTheSame) {
+  const MotionMachine::Motion brief{.since = started, .predicted = 200ms, .settling = settling};
+  Followed lags(brief);  // 1.25 times what was predicted, and a second
+  lags.moves(10ms);
+  EXPECT_EQ(lags.rests(210ms, {.elsewhere = true}), State::settling);
+  EXPECT_EQ(lags.arrives(1510ms), State::settling);
+  EXPECT_EQ(lags.arrives(2510ms), State::arrived);
+
+  Followed late(brief);
+  EXPECT_EQ(late.rests(1260ms, {.elsewhere = true, .at_target = true}), State::settling);
+  EXPECT_EQ(late.moves(2260ms), State::took_too_long) << "the next reading decides";
+
+  Followed wavers(brief);
+  wavers.moves(10ms);
+  EXPECT_EQ(wavers.rests(210ms, {.elsewhere = true, .at_target = true, .near_target = true}),
+            State::settling);
+  EXPECT_EQ(wavers.rests(560ms, {.elsewhere = true, .near_target = true}), State::settling);
+  EXPECT_EQ(wavers.rests(1210ms, {.elsewhere = true, .at_target = true, .near_target = true}),
+            State::arrived);
+
+  Followed beside({.since = started, .predicted = 60s, .settling = settling});
+  beside.moves(10ms);
+  beside.rests(210ms, {.elsewhere = true, .at_target = true, .near_target = true});
+  EXPECT_EQ(beside.rests(2200ms, {.elsewhere = true, .near_target = true}), State::settling);
+  EXPECT_EQ(beside.rests(2220ms, {.elsewhere = true, .near_target = true}), State::rests_elsewhere);
+}
+
 TEST(MotionMachine, AMotionInBetweenBreaksItsRestAtTheTarget) {
   Followed followed;
   followed.moves(10ms);
