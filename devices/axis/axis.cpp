@@ -143,9 +143,12 @@ void Axis::on_sample(const DriveSample& sample) {
   if (before && shaft_.hides_loss(*before, sample, turned_by, facts)) lose_trust();
   if (!sample.enabled) on_released(sample, before && before->enabled);
   watch_speed(SpeedWatch::Event::sampled);
-  const bool began = stop_.unseen_start().look({.asked_at = sample.asked_at,
-                                                .moving = sample.moving,
-                                                .elsewhere = moved_from(stop_.unseen_start().base())});
+  // A measured shaft may only settle there from the motion before.
+  const bool counted = drive_->position_window() == 0;
+  const bool began =
+      stop_.unseen_start().look({.asked_at = sample.asked_at,
+                                 .moving = sample.moving,
+                                 .elsewhere = counted && moved_from(stop_.unseen_start().base())});
   // A stop from before it began may have been ignored.
   if (began && stop_.under_way()) stop_.ask(StopKind::halt);
   // What a link that failed kept back was not heard, wherever the drive rests.

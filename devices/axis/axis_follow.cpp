@@ -31,6 +31,13 @@ void count(UnknownOutcomes& outcomes, StartReadback::State state) {
     ++outcomes.unresolved;
 }
 
+/// A measured shaft that is elsewhere than at `base` may only settle there from the motion before: it has
+/// come to this target where it is there, and nearer to it than to `base`.
+bool has_come(std::int64_t counter, std::int64_t base, std::int64_t target, std::int64_t tolerance) {
+  const auto left = std::abs(target - counter);
+  return left <= tolerance && left < std::abs(counter - base);
+}
+
 }  // namespace
 
 /// When a motion was read at rest at its target, and not too fast, by the drive that began it. Nothing: the
@@ -115,7 +122,7 @@ Task<bool> Axis::read_back(ActivityPtr activity, Error cause, std::int64_t base,
   // Its standstill is no proof: a restart would have ended a motion, too.
   const bool proven = readback.state() == State::resting && co_await proven_continuous(activity);
   // Proven continuous, it did not start; unless a pulse at a terminal, between two readings, ended the motion
-  // as it began, or took the shaft back, or it rests where it would have arrived.
+  // as it began, or took the shaft back, or it rests where it would have arrived, or elsewhere than it was.
   const bool terminals_may_hide_it = terminals_.may_start_motion() || terminals_.has("motor_free") ||
                                      terminals_.has("stop") || terminals_.has("quick_stop");
   const bool moves_to_a_target = activity->state != AxisState::homing && !activity->plan.endless;
@@ -123,7 +130,7 @@ Task<bool> Axis::read_back(ActivityPtr activity, Error cause, std::int64_t base,
     return std::abs(tracker_.counter() - activity->plan.target->counter) <= drive_->position_window();
   };
   if (proven)
-    readback.proven(!terminals_may_hide_it && !(moves_to_a_target && is_at_target()));
+    readback.proven(!terminals_may_hide_it && !moved_from(base) && !(moves_to_a_target && is_at_target()));
   else if (readback.state() == State::resting)
     readback.superseded();
   count(unknown_starts_, readback.state());
@@ -144,12 +151,15 @@ Task<bool> Axis::read_back(ActivityPtr activity, Error cause, std::int64_t base,
   co_return false;
 }
 
-/// What the newest reading says of a start from `base`.
+/// What the newest reading says of the activity's start from `base`. Precondition: there is an activity.
 std::optional<StartReadback::Reading> Axis::readback_of(std::int64_t base) const {
   if (!sample_) return std::nullopt;
-  return StartReadback::Reading{
-      .asked_at = sample_->asked_at,
-      .shows_it = sample_->moving || moved_from(base) || sample_->mode != DriveMode::positioning};
+  const auto& target = activity_->plan.target;
+  const bool certain = drive_->position_window() == 0 ||
+                       (target && has_come(tracker_.counter(), base, target->counter, target_tolerance()));
+  return StartReadback::Reading{.asked_at = sample_->asked_at,
+                                .shows_it = sample_->moving || (certain && moved_from(base)) ||
+                                            sample_->mode != DriveMode::positioning};
 }
 
 /// A position tells that the motion was executed. Where its drive takes it for arrived it may still be that
@@ -192,10 +202,13 @@ MotionMachine Axis::followed(const Plan& plan, std::int64_t base, TimePoint sinc
 
 /// What the newest reading says of a motion by that plan, from `base`. Precondition: there is one.
 MotionMachine::Reading Axis::reading_of(const Plan& plan, std::int64_t base) const {
+  const bool certain =
+      drive_->position_window() == 0 || held_back(plan) ||
+      (plan.target && has_come(tracker_.counter(), base, plan.target->counter, target_tolerance()));
   return {.asked_at = sample_->asked_at,
           .positioning = sample_->mode == DriveMode::positioning,
           .moving = sample_->moving,
-          .elsewhere = moved_from(base),
+          .elsewhere = certain && moved_from(base),
           .at_target = !plan.endless && is_at(*plan.target),
           .near_target = !plan.endless && is_near(*plan.target),
           .in_position = drive_->position_window() == 0 || sample_->in_position,
@@ -229,7 +242,10 @@ Task<bool> Axis::follow(ActivityPtr activity, std::int64_t base, TimePoint since
       co_return false;
     }
     if (!sample_) continue;
-    const auto state = motion.look(reading_of(plan, base));
+    auto reading = reading_of(plan, base);
+    if (reading.asked_at >= since + start_window)
+      reading.elsewhere = moved_from(base);  // nothing settles so long
+    const auto state = motion.look(reading);
     if (state <= State::settling) continue;
     pace_.came();
     if (state == State::arrived) co_return true;

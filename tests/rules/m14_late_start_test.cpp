@@ -2,6 +2,11 @@
 // M14).
 #include <gtest/gtest.h>
 
+#include <functional>
+#include <string>
+#include <string_view>
+#include <vector>
+
 #include "tests/support/rig.hpp"
 
 namespace axisd::test {
@@ -11,6 +16,42 @@ using namespace std::chrono_literals;
 using simulation::FaultKind;
 
 const RigOptions starts_late{.switches = {{"starts_late", true}}};
+
+/// A closed loop that begins late, with 1000 pulses per mm, and a shaft that follows its motor so late.
+RigOptions measured(std::string_view model, Duration following) {
+  RigOptions options{.model = std::string(model), .switches = {{"starts_late", true}}};
+  options.adjust = [](AxisSettings& axis) {
+    axis.scale.pulses_per_revolution = 10'000;
+    axis.homing->method = HomingMethod::negative_limit;
+    axis.homing->position = -60;
+    axis.homing->max_travel = 600;
+    axis.model_settings["released_position"] = std::string("counted");
+  };
+  options.adjust_drive = [following](simulation::SimulatedNodeSettings& node) {
+    for (auto* position : {&node.mechanics.home_switch_from, &node.mechanics.home_switch_to,
+                           &node.mechanics.positive_limit_from, &node.mechanics.negative_limit_from})
+      if (*position) **position *= 10;
+    node.encoder = {.noise = 1, .following = following, .quantised = true, .compliance = 10};
+  };
+  return options;
+}
+
+void on_each_measured(const std::function<void(const RigOptions&)>& test) {
+  for (const auto* model : {"ess42-r", "ssd2608pr"})
+    for (const auto following : {8ms, 20ms, 40ms}) {
+      SCOPED_TRACE(testing::Message() << model << ", following " << following.count() << " ms");
+      test(measured(model, following));
+    }
+}
+
+/// The motor gets pulses within `duration`.
+bool is_driven(Rig& rig, Duration duration) {
+  for (const auto end = rig.world.now() + duration; rig.world.now() < end; rig.run(1ms)) {
+    rig.drive->advance(rig.world.now());
+    if (rig.drive->shaft_moving()) return true;
+  }
+  return false;
+}
 
 /// Every so often a stop may come between a start's acknowledgement and 150 ms later.
 const std::vector<Duration> after_start{0ms, 1ms, 5ms, 15ms, 40ms, 70ms, 79ms, 81ms, 90ms, 150ms};
@@ -36,6 +77,74 @@ TEST(M14, AStopIsNotDoneBeforeTheMotionThatItStopsCannotBeginAnyMore) {
         EXPECT_EQ(rig.drive->shaft_pulses(), where) << "it has moved after its stop was done";
         EXPECT_EQ(rig.state()->state, AxisState::standstill);
       }
+}
+
+/// The shaft of a closed loop still comes to rest when the next motion is started: that it is elsewhere than
+/// then is no sign that this one has begun, and ended.
+TEST(M14, AShaftThatSettlesIsNotTakenForAMotionThatHasBegunAndEnded) {
+  on_each_measured([](const RigOptions& options) {
+    for (const auto delay : {0ms, 5ms, 15ms, 40ms}) {
+      SCOPED_TRACE(testing::Message() << "replaced, then stopped after " << delay.count() << " ms");
+      Rig rig(options);
+      rig.ready();
+      rig.submit(MoveAbsoluteRequest{.position = 300});
+      rig.run(1500ms);
+      const auto back = rig.submit(MoveAbsoluteRequest{.position = 20});
+      ASSERT_TRUE(rig.run_until([&] { return back->value().state == CommandState::active; }, 5s));
+      rig.run(delay);
+      const auto stop = rig.complete(StopRequest{});
+      EXPECT_EQ(stop.state, CommandState::done) << describe(stop);
+      EXPECT_FALSE(is_driven(rig, 700ms)) << "told at rest";
+    }
+    for (const auto delay : {10ms, 30ms, 50ms, 110ms}) {
+      SCOPED_TRACE(testing::Message() << "halted, moved, then stopped after " << delay.count() << " ms");
+      Rig rig(options);
+      rig.ready();
+      rig.submit(MoveAbsoluteRequest{.position = 300});
+      rig.run(900ms);
+      ASSERT_EQ(rig.complete(StopRequest{.kind = StopKind::halt}).state, CommandState::done);
+      rig.submit(MoveAbsoluteRequest{.position = 10});
+      rig.run(delay);
+      const auto stop = rig.complete(StopRequest{});
+      EXPECT_EQ(stop.state, CommandState::done) << describe(stop);
+      EXPECT_FALSE(is_driven(rig, 700ms)) << "told at rest";
+    }
+  });
+}
+
+TEST(M9, OnAMeasuredShaftThatSettlesOnlyTheLastOfThreeMotionsIsExecutedToItsEnd) {
+  on_each_measured([](const RigOptions& options) {
+    for (const auto delay : {0ms, 15ms, 70ms, 90ms}) {
+      SCOPED_TRACE(testing::Message() << delay.count() << " ms");
+      Rig rig(options);
+      rig.ready();
+      rig.submit(MoveAbsoluteRequest{.position = 300});
+      rig.run(1500ms);
+      const auto back = rig.submit(MoveAbsoluteRequest{.position = 20});
+      ASSERT_TRUE(rig.run_until([&] { return back->value().state == CommandState::active; }, 5s));
+      rig.run(delay);
+      const auto last = rig.complete(MoveAbsoluteRequest{.position = 200});
+      EXPECT_EQ(last.state, CommandState::done) << describe(last);
+      EXPECT_NEAR(rig.state()->position, 200, 0.03);
+      EXPECT_FALSE(is_driven(rig, 700ms)) << "told at rest";
+    }
+  });
+}
+
+/// Nor for a start that the drive has never seen: nobody may be told that it was executed.
+TEST(M8, AShaftThatSettlesDoesNotShowThatALostStartWasExecuted) {
+  on_each_measured([](const RigOptions& options) {
+    Rig rig(options);
+    rig.ready();
+    rig.submit(MoveAbsoluteRequest{.position = 300});
+    rig.run(1500ms);
+    rig.fault({.kind = FaultKind::drop_request, .function = 0x06, .register_address = 0x0027});
+    const auto back = rig.submit(MoveAbsoluteRequest{.position = 20});
+    ASSERT_TRUE(rig.run_until([&] { return back->has_ended(); }, 10s));
+    EXPECT_EQ(back->value().state, CommandState::error) << describe(back->value());
+    EXPECT_EQ(rig.axis().unknown_starts().executed, 0U);
+    EXPECT_FALSE(is_driven(rig, 700ms));
+  });
 }
 
 TEST(M9, AMotionThatIsReplacedBeforeItBeginsIsNotExecutedInItsPlace) {
