@@ -3,9 +3,11 @@
 
 #include "tests/bench/shared_counter.hpp"
 
+// NOLINTBEGIN(bugprone-reserved-identifier): of glibc
 extern "C" void* __libc_malloc(std::size_t size);
 extern "C" void* __libc_calloc(std::size_t count, std::size_t size);
 extern "C" void* __libc_realloc(void* memory, std::size_t size);
+// NOLINTEND(bugprone-reserved-identifier)
 
 namespace {
 
