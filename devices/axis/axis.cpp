@@ -143,12 +143,13 @@ void Axis::on_sample(const DriveSample& sample) {
   if (before && shaft_.hides_loss(*before, sample, turned_by, facts)) lose_trust();
   if (!sample.enabled) on_released(sample, before && before->enabled);
   watch_speed(SpeedWatch::Event::sampled);
-  // A measured shaft may only settle there from the motion before.
-  const bool counted = drive_->position_window() == 0;
-  const bool began =
-      stop_.unseen_start().look({.asked_at = sample.asked_at,
-                                 .moving = sample.moving,
-                                 .elsewhere = counted && moved_from(stop_.unseen_start().base())});
+  // A drive that cannot tell yet whether it rests is shown as moving, without speed or way. A measured shaft
+  // that is elsewhere may only have settled there from the motion before.
+  const auto window = drive_->position_window();
+  const bool began = stop_.unseen_start().look(
+      {.asked_at = sample.asked_at,
+       .moving = sample.moving && (sample.velocity_rpm != 0 || std::abs(turned_by) > window),
+       .elsewhere = window == 0 && moved_from(stop_.unseen_start().base())});
   // A stop from before it began may have been ignored.
   if (began && stop_.under_way()) stop_.ask(StopKind::halt);
   // What a link that failed kept back was not heard, wherever the drive rests.

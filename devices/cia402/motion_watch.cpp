@@ -33,7 +33,7 @@ void MotionWatch::take(DriveSample& sample, const Means& means) {
                                        .velocity_rpm = sample.velocity_rpm,
                                        .told = means.told},
                                       means.gauge);
-    if (!sample.moving) sample.velocity_rpm = 0;
+    if (!sample.moving || standstill_.doubted()) sample.velocity_rpm = 0;
   }
   note_direction(sample, means.gauge.window);
   sample.negative_direction = negative_;

@@ -41,7 +41,12 @@ bool Standstill::moves(const Look& look, const Gauge& gauge) {
     return false;
   }
   if (look.told && (*look.told || speed <= velocity_noise_rpm)) return note(look, *look.told);
-  if (!since_) return note(look, moves_);
+  if (!since_) {
+    const bool doubted = doubted_;
+    note(look, moves_);
+    doubted_ = doubted;
+    return moves_;
+  }
   const auto band = band_of(gauge);
   if (std::abs(way_between(since_->position, look.position)) > band) return note(look, true);
   const auto proof = time_of(std::max<std::int64_t>(band, 1), gauge.pulses_per_revolution);
@@ -53,6 +58,7 @@ bool Standstill::moves(const Look& look, const Gauge& gauge) {
 bool Standstill::note(const Look& look, bool moves) {
   since_ = look;
   unsettled_ = 0;
+  doubted_ = false;
   return moves_ = moves;
 }
 

@@ -46,8 +46,10 @@ class Standstill {
   /// It may have begun to move unseen, below the noise: rest has to be shown anew.
   void doubt() {
     since_.reset();
-    moves_ = true;
+    moves_ = doubted_ = true;
   }
+  /// It moves only as far as it has not shown its rest since doubt(): neither speed nor way tell so.
+  [[nodiscard]] bool doubted() const { return doubted_; }
 
  private:
   bool note(const Look& look, bool moves);
@@ -55,6 +57,7 @@ class Standstill {
 
   std::optional<Look> since_;  ///< it was there, and as it is
   bool moves_ = false;
+  bool doubted_ = false;
   int unsettled_ = 0;  ///< readings in a row that settles() was asked about
 };
 

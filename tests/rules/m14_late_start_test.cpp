@@ -2,56 +2,16 @@
 // M14).
 #include <gtest/gtest.h>
 
-#include <functional>
-#include <string>
-#include <string_view>
 #include <vector>
 
-#include "tests/support/rig.hpp"
+#include "tests/rules/late_start_rig.hpp"
+#include "tests/rules/m23_can_rig.hpp"
 
 namespace axisd::test {
 namespace {
 
 using namespace std::chrono_literals;
 using simulation::FaultKind;
-
-const RigOptions starts_late{.switches = {{"starts_late", true}}};
-
-/// A closed loop that begins late, with 1000 pulses per mm, and a shaft that follows its motor so late.
-RigOptions measured(std::string_view model, Duration following) {
-  RigOptions options{.model = std::string(model), .switches = {{"starts_late", true}}};
-  options.adjust = [](AxisSettings& axis) {
-    axis.scale.pulses_per_revolution = 10'000;
-    axis.homing->method = HomingMethod::negative_limit;
-    axis.homing->position = -60;
-    axis.homing->max_travel = 600;
-    axis.model_settings["released_position"] = std::string("counted");
-  };
-  options.adjust_drive = [following](simulation::SimulatedNodeSettings& node) {
-    for (auto* position : {&node.mechanics.home_switch_from, &node.mechanics.home_switch_to,
-                           &node.mechanics.positive_limit_from, &node.mechanics.negative_limit_from})
-      if (*position) **position *= 10;
-    node.encoder = {.noise = 1, .following = following, .quantised = true, .compliance = 10};
-  };
-  return options;
-}
-
-void on_each_measured(const std::function<void(const RigOptions&)>& test) {
-  for (const auto* model : {"ess42-r", "ssd2608pr"})
-    for (const auto following : {8ms, 20ms, 40ms}) {
-      SCOPED_TRACE(testing::Message() << model << ", following " << following.count() << " ms");
-      test(measured(model, following));
-    }
-}
-
-/// The motor gets pulses within `duration`.
-bool is_driven(Rig& rig, Duration duration) {
-  for (const auto end = rig.world.now() + duration; rig.world.now() < end; rig.run(1ms)) {
-    rig.drive->advance(rig.world.now());
-    if (rig.drive->shaft_moving()) return true;
-  }
-  return false;
-}
 
 /// Every so often a stop may come between a start's acknowledgement and 150 ms later.
 const std::vector<Duration> after_start{0ms, 1ms, 5ms, 15ms, 40ms, 70ms, 79ms, 81ms, 90ms, 150ms};
@@ -63,7 +23,7 @@ TEST(M14, AStopIsNotDoneBeforeTheMotionThatItStopsCannotBeginAnyMore) {
       for (const auto delay : after_start) {
         SCOPED_TRACE(testing::Message()
                      << to_string(kind_of(motion)) << ", " << delay.count() / 1e6 << " ms");
-        Rig rig(starts_late);
+        Rig rig(late());
         rig.ready();
         const auto command = rig.submit(motion);
         ASSERT_TRUE(rig.run_until([&] { return command->value().state == CommandState::active; }, 1s));
@@ -82,7 +42,7 @@ TEST(M14, AStopIsNotDoneBeforeTheMotionThatItStopsCannotBeginAnyMore) {
 /// The shaft of a closed loop still comes to rest when the next motion is started: that it is elsewhere than
 /// then is no sign that this one has begun, and ended.
 TEST(M14, AShaftThatSettlesIsNotTakenForAMotionThatHasBegunAndEnded) {
-  on_each_measured([](const RigOptions& options) {
+  on_each_measured_late([](const RigOptions& options) {
     for (const auto delay : {0ms, 5ms, 15ms, 40ms}) {
       SCOPED_TRACE(testing::Message() << "replaced, then stopped after " << delay.count() << " ms");
       Rig rig(options);
@@ -113,7 +73,7 @@ TEST(M14, AShaftThatSettlesIsNotTakenForAMotionThatHasBegunAndEnded) {
 }
 
 TEST(M9, OnAMeasuredShaftThatSettlesOnlyTheLastOfThreeMotionsIsExecutedToItsEnd) {
-  on_each_measured([](const RigOptions& options) {
+  on_each_measured_late([](const RigOptions& options) {
     for (const auto delay : {0ms, 15ms, 70ms, 90ms}) {
       SCOPED_TRACE(testing::Message() << delay.count() << " ms");
       Rig rig(options);
@@ -133,7 +93,7 @@ TEST(M9, OnAMeasuredShaftThatSettlesOnlyTheLastOfThreeMotionsIsExecutedToItsEnd)
 
 /// Nor for a start that the drive has never seen: nobody may be told that it was executed.
 TEST(M8, AShaftThatSettlesDoesNotShowThatALostStartWasExecuted) {
-  on_each_measured([](const RigOptions& options) {
+  on_each_measured_late([](const RigOptions& options) {
     Rig rig(options);
     rig.ready();
     rig.submit(MoveAbsoluteRequest{.position = 300});
@@ -147,10 +107,29 @@ TEST(M8, AShaftThatSettlesDoesNotShowThatALostStartWasExecuted) {
   });
 }
 
+/// By CiA 402: after a stop a drive without a word of its own moves until it has shown its rest. That is no
+/// sign that a start has begun, of which nobody knows whether it arrived.
+TEST(M14, ADoubtAboutRestIsNotTakenForAMotionThatHasBegun) {
+  for (const auto delay : {5ms, 20ms, 60ms}) {
+    SCOPED_TRACE(testing::Message() << delay.count() << " ms");
+    CanRig rig({.model = "cia402"});
+    rig.ready();
+    rig.done(MoveAbsoluteRequest{.position = 30});
+    rig.nodes().add_fault({.kind = FaultKind::drop_request, .object = 0x6040});
+    rig.submit(MoveAbsoluteRequest{.position = 300});
+    ASSERT_TRUE(rig.run_until([&] { return rig.nodes().pending_faults() == 0; }, 1s));
+    rig.run(delay);
+    const auto asked = rig.world.now();
+    const auto stop = rig.complete(StopRequest{});
+    EXPECT_EQ(stop.state, CommandState::done) << describe(stop);
+    EXPECT_GE(rig.world.now() - asked, start_window);
+  }
+}
+
 TEST(M9, AMotionThatIsReplacedBeforeItBeginsIsNotExecutedInItsPlace) {
   for (const auto delay : after_start) {
     SCOPED_TRACE(testing::Message() << delay.count() / 1e6 << " ms");
-    Rig rig(starts_late);
+    Rig rig(late());
     rig.ready();
     ASSERT_EQ(rig.complete(MoveAbsoluteRequest{.position = 100}).state, CommandState::done);
     const auto first = rig.submit(MoveAbsoluteRequest{.position = 300});
@@ -165,7 +144,7 @@ TEST(M9, AMotionThatIsReplacedBeforeItBeginsIsNotExecutedInItsPlace) {
 
 /// The stop that is owed is the first that the drive gets then; but it had not begun yet.
 TEST(M4, AMotionThatBeginsUnderTheStopOfAReconnectIsStoppedAgain) {
-  Rig rig(starts_late);
+  Rig rig(late());
   rig.ready();
   const auto move = rig.submit(MoveAbsoluteRequest{.position = 300, .with = {.velocity = 50}});
   ASSERT_TRUE(rig.run_until([&] { return move->value().state == CommandState::active; }, 1s));

@@ -51,6 +51,22 @@ TEST_F(Motion, WhatDoesNotShowInTimeDidNotStart) {
   EXPECT_EQ(watch_.state(), State::rest);
 }
 
+/// Whoever looks for a motion that has begun must not take a doubt about rest for one.
+TEST_F(Motion, WhatOnlyHasToShowItsRestMovesWithoutAVelocity) {
+  const auto by_way = [this](Duration after, std::int32_t position, int rpm) {
+    DriveSample sample{.asked_at = start + after, .position_pulses = position, .velocity_rpm = rpm};
+    watch_.take(sample, {.by_way = true, .gauge = {.window = 10, .pulses_per_revolution = 1000}});
+    return sample;
+  };
+  EXPECT_FALSE(by_way(0ms, 0, 0).moving);
+  watch_.begin(start);
+  watch_.stop(false);
+  EXPECT_TRUE(by_way(20ms, 1, 1).moving);
+  EXPECT_EQ(by_way(30ms, 1, 1).velocity_rpm, 0);
+  EXPECT_TRUE(by_way(40ms, 10, 1).moving);
+  EXPECT_EQ(by_way(50ms, 12, 1).velocity_rpm, 1) << "its way shows it";
+}
+
 TEST_F(Motion, AStopEndsIt) {
   watch_.begin(start);
   watch_.stop(false);

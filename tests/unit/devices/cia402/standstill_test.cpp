@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <vector>
 
 namespace axisd::cia402 {
 namespace {
@@ -156,6 +157,23 @@ TEST(Standstill, WhatMayHaveBegunToMoveHasToShowItsRest) {
   EXPECT_FALSE(standstill.moves(look(640ms, 2, 1), gauge));
   standstill.doubt();
   EXPECT_FALSE(standstill.moves(look(660ms, 2, 1, false), gauge)) << "the drive's own word counts at once";
+}
+
+TEST(Standstill, ADoubtLastsUntilSpeedWayOrRestShows) {
+  const auto doubted = [](const std::vector<Standstill::Look>& looks) {
+    Standstill standstill;
+    EXPECT_FALSE(standstill.moves(look(0ms, 0, 0), gauge));
+    EXPECT_FALSE(standstill.doubted());
+    standstill.doubt();
+    for (const auto& one : looks) (void)standstill.moves(one, gauge);
+    return standstill.doubted();
+  };
+  EXPECT_TRUE(doubted({}));
+  EXPECT_TRUE(doubted({look(20ms, 1, 1), look(40ms, 0, -1)}));
+  EXPECT_FALSE(doubted({look(20ms, 1, 2)})) << "a speed";
+  EXPECT_FALSE(doubted({look(20ms, 0, 0), look(40ms, 6, 0)})) << "a way";
+  EXPECT_FALSE(doubted({look(20ms, 0, 0, true)})) << "its own word";
+  EXPECT_FALSE(doubted({look(20ms, 0, 0), look(640ms, 0, 0)})) << "rest";
 }
 
 }  // namespace
