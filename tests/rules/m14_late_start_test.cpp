@@ -190,6 +190,23 @@ TEST(M10, AMotionThatGoesTheWrongWayIsStopped) {
   EXPECT_GT(rig.state()->position, where - 60) << "stopped soon behind its start";
 }
 
+TEST(M10, AMotionThatGoesBeyondItsTargetIsStopped) {
+  Rig rig({.switches = {{"start_in_motion", true}}});
+  rig.ready();
+  const auto move = rig.submit(MoveAbsoluteRequest{.position = 300, .with = {.velocity = 50}});
+  ASSERT_TRUE(rig.run_until([&] { return rig.state()->position > 290; }, 10s));
+  // As if the drive executed another motion than this one: to 450 mm. The canary does not show it so soon.
+  rig.write_behind(0x0024, 0);
+  rig.write_behind(0x0025, 45'000);
+  rig.write_behind(0x0027, 5);
+  ASSERT_TRUE(rig.run_until([&] { return move->has_ended(); }, 20s));
+  EXPECT_EQ(move->value().state, CommandState::error) << describe(move->value());
+  rig.run(2s);
+  EXPECT_FALSE(rig.drive->shaft_moving());
+  EXPECT_GT(rig.state()->position, 301);
+  EXPECT_LT(rig.state()->position, 320) << "stopped soon behind its target";
+}
+
 /// What is acknowledged may be looked after; what is not goes out again as long as the motor turns (M4).
 TEST(M13, WhileTheMotorTurnsStopsGoOutUntilOneIsAcknowledged) {
   Rig rig;

@@ -136,6 +136,25 @@ TEST(M31, ALongDecelerationBeforeItIsNoLateness) {
   }
 }
 
+/// Nor is the time until it is known that the motion before it does not begin any more (M9).
+TEST(M31, TheTimeThatAnUnseenStartMayStillTakeIsNoLateness) {
+  auto base = kept();
+  base.adjust = [](AxisSettings& axis) {
+    axis.limits.acceleration_time = 50ms;
+    axis.limits.deceleration_time = 50ms;
+    axis.stop_margin = 100ms;
+    axis.start_within = 200ms;
+  };
+  Rig rig(base);
+  rig.ready();
+  rig.fault({.kind = simulation::FaultKind::drop_request, .function = 0x06, .register_address = 0x0027});
+  const auto lost = rig.submit(MoveAbsoluteRequest{.position = 300}, options(rig, "lost"));
+  ASSERT_TRUE(rig.run_until([&] { return rig.triggers() > 0; }, 1s));
+  const auto next = rig.submit(MoveAbsoluteRequest{.position = 20}, options(rig, "next"));
+  ASSERT_TRUE(rig.run_until([&] { return next->has_ended(); }, 10s));
+  EXPECT_EQ(next->value().state, CommandState::done) << describe(next->value());
+}
+
 TEST(M31, WhatWaitsInTheBufferHasItsBoundFromItsTurn) {
   for (const bool slow : {false, true}) {
     Rig rig(kept());
