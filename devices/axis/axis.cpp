@@ -9,6 +9,7 @@
 #include "devices/alarm_text.hpp"
 #include "devices/axis/axis_log.hpp"
 #include "devices/axis/plcopen_state.hpp"
+#include "devices/axis/restart_mark.hpp"
 #include "devices/released_position.hpp"
 
 namespace axisd {
@@ -68,6 +69,11 @@ void Axis::launch(Task<> sequence, const char* name) {
 }
 
 void Axis::close() {
+  // With what a start that was not sent has left in the drive. What moves comes to rest elsewhere.
+  if (!life_.ends() && env_.persistence != nullptr && link_.is_configured() && drive_->continuity_mark()) {
+    const auto trust = at_rest() ? tracker_.trust() : PositionTrust::unknown;
+    env_.persistence->save_offset(settings_.name, offset_record(tracker_.offset(), trust), {});
+  }
   life_.close();
   link_.close();
   supersede(error(Reason::cancelled, "the daemon ends"));
@@ -260,7 +266,8 @@ void Axis::lose_trust() {
     });
   if (tracker_.trust() == PositionTrust::unknown) return;
   tracker_.lose_trust();
-  if (env_.persistence != nullptr) env_.persistence->forget_offset(settings_.name, {});
+  if (env_.persistence != nullptr)
+    forget_position(*env_.persistence, settings_.name, power_.state() == PowerMachine::State::restarted);
 }
 
 OffsetRecord Axis::offset_record(std::int64_t offset, PositionTrust trust) const {
@@ -274,6 +281,7 @@ OffsetRecord Axis::offset_record(std::int64_t offset, PositionTrust trust) const
                       .pulses_per_revolution = settings_.scale.pulses_per_revolution,
                       .invert = settings_.scale.invert};
   if (const auto mark = drive_->continuity_mark()) record.canary = *mark;
+  if (power_.state() == PowerMachine::State::restarted) record.canary = restart_mark;
   return record;
 }
 

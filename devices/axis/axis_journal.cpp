@@ -9,6 +9,7 @@
 
 #include "devices/axis/axis.hpp"
 #include "devices/axis/axis_log.hpp"
+#include "devices/axis/restart_mark.hpp"
 #include "devices/axis/settlement.hpp"
 
 namespace axisd {
@@ -59,6 +60,8 @@ Task<Result<void>> Axis::settle_earlier() {
     const auto proof = co_await drive_->check_continuity(TransactionClass::parameters);
     if (!proof && proof.error().reason != Reason::rebooted) co_return proof;
     continuous = proof.has_value();
+    if (!continuous) power_.restarted();
+    if (!continuous && env_.persistence != nullptr) forget_position(*env_.persistence, settings_.name, true);
   }
   // The last frame of the run before may have gone out just now.
   co_await sleep_until(env_.executor, *env_.clock, env_.clock->now() + start_window);
@@ -195,7 +198,8 @@ Task<Result<void>> Axis::forget_saved_position() {
 /// What was saved for a command that then came to nothing: the record says again what the axis goes by.
 void Axis::correct_saved_position() {
   if (tracker_.trust() != PositionTrust::unknown) return remember_position();
-  if (env_.persistence != nullptr) env_.persistence->forget_offset(settings_.name, {});
+  if (env_.persistence != nullptr)
+    forget_position(*env_.persistence, settings_.name, power_.state() == PowerMachine::State::restarted);
 }
 
 }  // namespace axisd

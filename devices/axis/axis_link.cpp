@@ -7,6 +7,7 @@
 
 #include "devices/axis/axis.hpp"
 #include "devices/axis/axis_log.hpp"
+#include "devices/axis/restart_mark.hpp"
 
 namespace axisd {
 
@@ -184,9 +185,14 @@ Task<Result<void>> Axis::prove_or_configure() {
     const auto proof = co_await prove_continuity(TransactionClass::parameters);
     if (!proof && proof.error().reason != Reason::rebooted) co_return proof;
     if (!proof && link_.is_configured()) on_reboot(proof.error());
-    if (!proof && restorable) void_saved_position();
-    if (!proof) power_.restarted();  // also where an earlier run of the daemon knew it (M1)
-    if (!proof) restorable.reset();
+    // Also where an earlier run of the daemon knew the drive (M1). If that does not count from 0, that run
+    // has died before it kept what it wrote last.
+    const bool counts_on = drive_->Drive::rules_out_restart(*sample_) && !may_move_by_itself();
+    if (!proof && !counts_on) power_.restarted();
+    if (restorable && (!proof || restorable->trust == PositionTrust::unknown)) {
+      void_saved_position();
+      restorable.reset();
+    }
     if (life_.ends()) co_return fail(ending());
   }
   if (!link_.is_configured()) {
@@ -209,25 +215,36 @@ Task<Result<void>> Axis::prove_or_configure() {
   co_return Result<void>{};
 }
 
-/// The position that an earlier run of the daemon saved, if it still holds should the drive prove that it
-/// kept its memory since. Else it is voided.
+/// What an earlier run of the daemon saved, if the drive can prove by it that it kept its memory since. The
+/// position holds then; its trust is unknown where it does not in any case, and is voided.
 std::optional<OffsetRecord> Axis::restorable_position() {
   using Position = EarlierRun::Position;
   if (link_.is_configured() || earlier_.position() == Position::tried || env_.persistence == nullptr)
     return std::nullopt;
   const auto& axes = env_.persistence->current().axes;
   const auto found = axes.find(settings_.name);
-  const auto record = found == axes.end() ? std::nullopt : found->second.offset;
+  auto record = found == axes.end() ? std::nullopt : found->second.offset;
   if (!record) return std::nullopt;
+  if (record->canary == restart_mark) {  // kept until somebody enables it (M1)
+    power_.restarted();
+    earlier_.tried();
+    return std::nullopt;
+  }
+  // By the journal it has proven it already, and holds what was written for a motion since.
+  const auto found_there = drive_->continuity_mark();
+  if (record->canary == ContinuityMark{} || (found_there && *found_there != record->canary)) {
+    void_saved_position();
+    return std::nullopt;
+  }
   const bool restorable =
       earlier_.position() == Position::saved && !terminal_may_void_position() &&
       record->trust != PositionTrust::unknown && record->invert == settings_.scale.invert &&
       record->pulses_per_revolution == settings_.scale.pulses_per_revolution &&
       !moved_from(tracker_.counter() - sample_->position_pulses + record->last_position_pulses) &&
       (sample_->enabled || counts_while_released());
-  if (!restorable) {
-    void_saved_position();
-    return std::nullopt;
+  if (!restorable && record->trust != PositionTrust::unknown) {
+    record->trust = PositionTrust::unknown;  // it may come true again by chance, but never by right
+    env_.persistence->save_offset(settings_.name, *record, {});
   }
   drive_->expect_marks({record->canary});
   return record;
@@ -236,7 +253,7 @@ std::optional<OffsetRecord> Axis::restorable_position() {
 /// What it says may come true again by chance, but never by right.
 void Axis::void_saved_position() {
   earlier_.tried();
-  env_.persistence->forget_offset(settings_.name, {});
+  forget_position(*env_.persistence, settings_.name, power_.state() == PowerMachine::State::restarted);
 }
 
 /// `restorable`: takes that position over.
@@ -337,6 +354,7 @@ void Axis::on_reboot(const Error& cause) {
   stop_.restarted();
   stop_.unseen_start().restarted();
   lose_trust();
+  if (env_.persistence != nullptr) forget_position(*env_.persistence, settings_.name, true);
   tracker_.restart(sample_ ? sample_->position_pulses : 0);
   publish();
   sampled_.notify_all();

@@ -69,7 +69,9 @@ void Axis::end_enable(Activity& activity, EnableMachine::State state, std::optio
     return on_turned_by_power(error(Reason::terminal, "the drive moved when it was enabled",
                                     "check terminals that start motion; then reset the axis"));
   if (state == EnableMachine::State::on) {
+    const bool restarted = power_.state() == PowerMachine::State::restarted;
     power_.enabled();
+    if (restarted) correct_saved_position();  // a later run of the daemon need not know of it any more
     return finish(activity, [](CommandRecord& command) { command.done(); });
   }
   auto cause = error(Reason::not_confirmed, "the drive does not report its power stage as on",

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "devices/axis/axis.hpp"
+#include "devices/axis/restart_mark.hpp"
 
 namespace axisd {
 
@@ -59,7 +60,8 @@ void Axis::retire(bool position_holds) {
   life_.retire(!link_.offline());
   link_.explain(reloading());
   if (terminal_may_void_position() || !position_holds) lose_trust();
-  if (!position_holds && env_.persistence != nullptr) env_.persistence->forget_offset(settings_.name, {});
+  if (!position_holds && env_.persistence != nullptr)
+    forget_position(*env_.persistence, settings_.name, power_.state() == PowerMachine::State::restarted);
   remember_position();
   close();
   env_.bus->port_changed().notify_all();  // whoever waits for the port looks again

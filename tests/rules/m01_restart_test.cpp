@@ -38,6 +38,107 @@ TEST(M01, ARestartedDriveStartsNothingUntilItIsEnabled) {
   });
 }
 
+/// The drive was switched off and on while there was no daemon: wherever it had stood, and whether the
+/// daemon had ended or had died.
+TEST(M01, ARestartBetweenTwoRunsOfTheDaemonIsNoticed) {
+  both_directions({.persistence = true, .journal = true}, [](const RigOptions& options) {
+    for (const auto place : {0.0, 10.0})
+      for (const bool killed : {false, true}) {
+        SCOPED_TRACE(testing::Message() << place << " mm" << (killed ? ", killed" : ""));
+        ExplainRig rig(options);
+        rig.ready();
+        EXPECT_EQ(rig.complete(MoveAbsoluteRequest{.position = 10}).state, CommandState::done);
+        EXPECT_EQ(rig.complete(MoveAbsoluteRequest{.position = place}).state, CommandState::done);
+        rig.run(1s);
+        killed ? rig.kill_daemon() : rig.stop_daemon();
+        rig.cycle_power(10ms);
+        rig.idle(2s);
+        rig.start_daemon();
+        ASSERT_TRUE(rig.state()->enabled);
+        EXPECT_THAT(rig.text(MoveRelativeRequest{.distance = 1}, Reason::disabled),
+                    HasSubstr("switched off and on"));
+        EXPECT_FALSE(rig.try_submit(MoveRelativeRequest{.distance = 1}));
+        rig.enable();
+        EXPECT_EQ(rig.complete(MoveRelativeRequest{.distance = 1}).state, CommandState::done);
+      }
+  });
+}
+
+TEST(M01, ARestartBetweenTwoRunsIsNoticedOfAnAxisWithoutPosition) {
+  Rig rig({.persistence = true, .journal = true});
+  rig.enable();
+  rig.stop_daemon();
+  rig.cycle_power(10ms);
+  rig.idle(2s);
+  rig.start_daemon();
+  const auto refused = rig.try_submit(MoveRelativeRequest{.distance = 1});
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().message, HasSubstr("switched off and on"));
+}
+
+/// Also one in the midst of a motion, of which nobody had heard.
+TEST(M01, ARestartInTheMidstOfAMotionOfADeadDaemonIsNoticed) {
+  Rig rig({.persistence = true, .journal = true});
+  rig.ready();
+  rig.submit(MoveAbsoluteRequest{.position = 100});
+  rig.run(500ms);
+  rig.kill_daemon();
+  rig.cycle_power(10ms);
+  rig.idle(2s);
+  rig.start_daemon();
+  rig.complete(ResetRequest{});
+  const auto refused = rig.try_submit(MoveRelativeRequest{.distance = 1});
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().message, HasSubstr("switched off and on"));
+}
+
+/// What one run of the daemon has noticed, the next one knows, until somebody enables the axis.
+TEST(M01, ARestartIsNotForgottenWithTheRunThatNoticedIt) {
+  for (const bool positioned : {false, true}) {
+    Rig rig({.persistence = true, .journal = true});
+    rig.ready();
+    EXPECT_EQ(rig.complete(MoveAbsoluteRequest{.position = 10}).state, CommandState::done);
+    rig.cycle_power(10ms);
+    ASSERT_TRUE(rig.run_until([&] { return rig.state()->reboots == 1; }, 5s));
+    rig.reconnect();
+    if (positioned) rig.complete(SetPositionRequest{.position = 5});
+    for (int run = 0; run < 2; ++run) {
+      run == 0 ? rig.stop_daemon() : rig.kill_daemon();
+      rig.start_daemon();
+      const auto refused = rig.try_submit(MoveRelativeRequest{.distance = 1});
+      ASSERT_FALSE(refused) << run;
+      EXPECT_EQ(refused.error().reason, Reason::disabled);
+      EXPECT_EQ(rig.state()->trust, PositionTrust::unknown);
+    }
+    rig.enable();
+    rig.complete(SetPositionRequest{.position = 5});
+    rig.stop_daemon();
+    rig.start_daemon();
+    EXPECT_EQ(rig.state()->trust, PositionTrust::restored);
+    EXPECT_EQ(rig.complete(MoveRelativeRequest{.distance = 1}).state, CommandState::done);
+  }
+}
+
+/// Whenever a daemon ends or dies, its drive is not taken for one that was restarted.
+TEST(M01, ADriveThatKeptItsPowerMayMoveAfterARestartOfTheDaemon) {
+  for (const bool killed : {false, true})
+    for (auto at = 0ms; at <= 1500ms; at += 31ms) {
+      SCOPED_TRACE(testing::Message() << at.count() << " ms" << (killed ? ", killed" : ""));
+      Rig rig({.persistence = true, .journal = true});
+      rig.ready();
+      EXPECT_EQ(rig.complete(MoveAbsoluteRequest{.position = 10}).state, CommandState::done);
+      rig.submit(MoveAbsoluteRequest{.position = 60});
+      rig.run(at);
+      killed ? rig.kill_daemon() : rig.stop_daemon();
+      rig.idle(50ms);
+      rig.start_daemon();
+      rig.run(1s);
+      if (rig.state()->state == AxisState::error_stop) rig.complete(ResetRequest{});
+      const auto move = rig.complete(MoveRelativeRequest{.distance = 1});
+      EXPECT_EQ(move.state, CommandState::done) << describe(move);
+    }
+}
+
 /// The axis that comes after it would know nothing of the restart.
 TEST(M01, ARestartedDriveIsNotGivenToAnotherAxisBeforeItIsEnabled) {
   Rig rig;
