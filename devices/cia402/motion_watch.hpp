@@ -47,8 +47,8 @@ class MotionWatch {
 
   /// Takes a reading, in order; corrects its motion, velocity and direction. What is measured wavers: a
   /// little of it is no motion, and has no direction. What has to show its rest first moves without a
-  /// velocity. Where positions are exact they know better than the
-  /// drive's own word, which may be that it is near its target.
+  /// velocity. Where positions are exact they know better than the drive's own word, which may be that it is
+  /// near its target.
   void take(DriveSample& sample, const Means& means);
 
   [[nodiscard]] State state() const { return state_; }
