@@ -18,7 +18,7 @@ void Quarantine::silent(std::uint8_t node, TimePoint now, Duration cost, Unanswe
   auto& known = nodes_[node];
   known.good = 0;
   known.stop_in_vain = known.stop_in_vain || stop;
-  if (what != Unanswered::request && !known.owed_since) known.owed_since = now;
+  if (what == Unanswered::owed_stop && !known.owed_since) known.owed_since = now;
   // Stops alone do not put a node there: their repetitions are few, and urgent.
   if (stop && known.level == 0) return;
   const bool was_there = known.quarantined();
