@@ -63,6 +63,12 @@ void Axis::retire(bool position_holds) {
   if (!position_holds && env_.persistence != nullptr)
     forget_position(*env_.persistence, settings_.name, power_.state() == PowerMachine::State::restarted);
   remember_position();
+  // By this the axis that comes after it finds a restart of the drive, also where there is no position (M1).
+  const bool keeps_canary =
+      env_.persistence != nullptr && link_.is_configured() && drive_->continuity_mark().has_value();
+  if (keeps_canary && tracker_.trust() == PositionTrust::unknown)
+    env_.persistence->save_offset(settings_.name, offset_record(tracker_.offset(), PositionTrust::unknown),
+                                  {});
   close();
   env_.bus->port_changed().notify_all();  // whoever waits for the port looks again
 }

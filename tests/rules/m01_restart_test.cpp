@@ -1,4 +1,5 @@
 // M1: what a drive that was restarted may be told before a client has enabled it.
+#include "config/fields.hpp"
 #include "tests/rules/explain_rig.hpp"
 
 namespace axisd::test {
@@ -153,6 +154,33 @@ TEST(M01, ARestartedDriveIsNotGivenToAnotherAxisBeforeItIsEnabled) {
   EXPECT_THAT(refused[0].message, HasSubstr("switched off and on"));
   rig.enable();
   EXPECT_TRUE(rig.axis().check_exchange(true).empty());
+}
+
+/// The drive was switched off when its axis was exchanged, and comes back energised.
+TEST(M01, ARestartBehindAnExchangeOfTheAxisIsNoticed) {
+  Rig rig({.persistence = true, .journal = true});
+  rig.enable();
+  rig.drive->advance(rig.world.now());
+  rig.drive->set_power(false);
+  ASSERT_TRUE(rig.run_until([&] { return rig.state()->link == LinkState::offline; }, 20s));
+  auto wanted = rig.configuration;
+  wanted.axes.at(0).axis.limits.velocity = 50;
+  bool through = false;
+  rig.machine->reload({.client = "fitter",
+                       .configuration = wanted,
+                       .changes = config::differences(rig.configuration, wanted)},
+                      [&](const std::vector<Error>& refusals) {
+                        EXPECT_TRUE(refusals.empty()) << to_string(refusals.front());
+                        through = true;
+                      });
+  ASSERT_TRUE(rig.run_until([&] { return through; }, 5s));
+  rig.drive->advance(rig.world.now());
+  rig.drive->set_power(true);
+  rig.reconnect();
+  ASSERT_TRUE(rig.state()->enabled);
+  const auto refused = rig.try_submit(MoveRelativeRequest{.distance = 1});
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().message, HasSubstr("switched off and on"));
 }
 
 /// Nobody knows of a restart: it may have been energised, and at work, all the time.
