@@ -211,6 +211,7 @@ MotionMachine::Reading Axis::reading_of(const Plan& plan, std::int64_t base) con
           .elsewhere = certain && moved_from(base),
           .at_target = !plan.endless && is_at(*plan.target),
           .near_target = !plan.endless && is_near(*plan.target),
+          .beside = !plan.endless && moved_from(base) && !is_at(*plan.target),
           .in_position = drive_->position_window() == 0 || sample_->in_position,
           .held_back = held_back(plan),
           .astray = is_astray(plan, base)};

@@ -25,6 +25,7 @@ void MotionMachine::go_on() {
   if (state_ == State::arrived) state_ = State::running;
   rests_since_.reset();
   there_since_.reset();
+  was_beside_ = false;
 }
 
 MotionMachine::State MotionMachine::look(const Reading& reading) {
@@ -42,6 +43,7 @@ MotionMachine::State MotionMachine::look(const Reading& reading) {
     if (reading.astray) return state_ = State::astray;
     rests_since_.reset();
     there_since_.reset();
+    was_beside_ = false;
     if (state_ == State::settling) state_ = State::running;
   } else {
     state_ = judge_rest(reading);
@@ -60,10 +62,13 @@ MotionMachine::State MotionMachine::look(const Reading& reading) {
 MotionMachine::State MotionMachine::judge_rest(const Reading& reading) {
   if (!rests_since_) rests_since_ = reading.asked_at;
   // Before it moved it may rest within the tolerance, too.
-  if (state_ == State::starting) return State::starting;
+  if (state_ == State::starting) {
+    was_beside_ = was_beside_ || reading.beside;
+    return State::starting;
+  }
   if (reading.at_target) {
     if (!there_since_) there_since_ = reading.asked_at;
-    const bool seen_unsettled = state_ == State::settling;
+    const bool seen_unsettled = state_ == State::settling || was_beside_;
     const bool settled = reading.in_position && !seen_unsettled;
     if (settled || reading.asked_at - *there_since_ >= still) return State::arrived;
     rests_since_ = reading.asked_at;

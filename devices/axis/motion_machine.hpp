@@ -56,6 +56,7 @@ class MotionMachine {
     bool elsewhere = false;    ///< than where it started
     bool at_target = false;    ///< of a motion that has one
     bool near_target = false;  ///< or beside it by no more than a reading may waver
+    bool beside = false;       ///< neither where it started nor at its target, whatever took it there
     bool in_position = false;  ///< its drive says so, or counts its position: one reading is enough
     bool held_back = false;    ///< by a limit or a stop terminal
     bool astray = false;       ///< further from where it started, or from its target, than this motion goes
@@ -83,6 +84,8 @@ class MotionMachine {
   std::optional<TimePoint> rests_since_;
   /// At rest at its target by this reading, and near it by all since.
   std::optional<TimePoint> there_since_;
+  /// At rest beside it before its motion was known to have begun: it is not settled by one reading.
+  bool was_beside_ = false;
 };
 
 /// What became of a start whose trigger was sent and got no reply that says so (M8). Pure. Thread: core.

@@ -103,6 +103,19 @@ TEST(MotionMachine, WhatWaversAtTheEdgeOfItsWindowHasArrived) {
   EXPECT_EQ(followed.arrives(60ms), State::arrived);
 }
 
+/// A brief motion is over before it is read: its shaft rings when it is seen for the first time.
+TEST(MotionMachine, WhatRingsBeforeItIsKnownToHaveBegunHasNotArrived) {
+  Followed followed;
+  EXPECT_EQ(followed.rests(30ms, {.beside = true}), State::starting);
+  EXPECT_EQ(followed.arrives(40ms), State::settling) << "it crosses its target";
+  EXPECT_EQ(followed.arrives(60ms), State::arrived);
+
+  Followed moved;
+  EXPECT_EQ(moved.rests(30ms, {.beside = true}), State::starting) << "the motion before settles";
+  moved.moves(40ms);
+  EXPECT_EQ(moved.arrives(50ms), State::arrived);
+}
+
 /// On a full line a reading comes a second after the one before.
 TEST(MotionMachine, WhatIsReadSeldomArrivesAllTheSame) {
   const MotionMachine::Motion brief{.since = started, .predicted = 200ms, .settling = settling};
