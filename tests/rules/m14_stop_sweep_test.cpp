@@ -138,6 +138,15 @@ TEST(M22, NoMemberGoesOnOnceTheStopOfAnotherIsDone) {
   }
 }
 
+/// Of a start that was on the wire when its group was given up nobody tells any more what became of it.
+TEST(M22, AMemberWhoseStartWasLostAsItsGroupWasGivenUpComesToRest) {
+  GroupRig rig(late_group());
+  rig.faults().add({.kind = FaultKind::drop_request, .function = 0x06, .register_address = 0x0027});
+  rig.move(GroupRig::to({{"x", 300}, {"y", 200}}));
+  ASSERT_TRUE(rig.run_until([&] { return rig.writes(1, 0x0027) + rig.writes(2, 0x0027) > 0; }, 1s));
+  stop_member(rig);
+}
+
 TEST(M22, NoMemberGoesOnOnceTheStopOfAnotherIsDoneAboutTheMomentOfTheStart) {
   for (auto delay = -20ms; delay < 130ms; delay += delay < 20ms ? 1ms : 7ms) {
     SCOPED_TRACE(testing::Message() << delay.count() << " ms");
