@@ -7,7 +7,7 @@ differ from where this branch left origin/main, or on main itself those that the
 --since COMMIT: those that changed since then. --whole: on every file of the product, the checks that are quick: how large
 and complex a function is, and functions that no header declares.
 
-ccache remembers which files were found clean (tidy_compiler.sh). AXISD_TIDY_SECONDS (300; --whole: 900) bounds the time:
+ccache remembers which files were found clean (tidy_compiler.sh). AXISD_TIDY_SECONDS (300) bounds the time:
 beyond it no further file is begun, and those left out are named; the next run has time for them.
 """
 
@@ -98,7 +98,7 @@ def main():
         files = [Path(name) for name in git("diff", "--name-only", "--diff-filter=d", start, "--", "*.cpp").splitlines()]
         files = [file for file in files if file in known]
         print(f"tidy: {len(files)} file(s) changed since {start[:8]}", flush=True)
-    end = time.monotonic() + float(os.environ.get("AXISD_TIDY_SECONDS", 900 if arguments.whole else 300))
+    end = time.monotonic() + float(os.environ.get("AXISD_TIDY_SECONDS", 300))
     folder = build / "tidy"
     folder.mkdir(exist_ok=True)
     told, failed, left_out = environment(options), 0, []
