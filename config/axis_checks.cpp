@@ -72,6 +72,8 @@ std::string AxisChecks::velocity_text(double value) const {
   return fmt::format("{} {}/s", format_number(value), axis_.scale.unit);
 }
 
+namespace {
+
 /// Files that are named in a configuration are smaller.
 constexpr std::size_t largest_file = 4U << 20U;
 /// One line about such a file, which quotes its path and its text.
@@ -82,6 +84,8 @@ std::size_t content_of(const SettingValue& path) {
   const auto text = read_regular_file(std::get<std::string>(path), largest_file);
   return text ? std::hash<std::string>()(*text) : 0;
 }
+
+}  // namespace
 
 void AxisChecks::specialise() {
   if (model_ == nullptr || model_->specialise == nullptr || !usable("drive")) return;

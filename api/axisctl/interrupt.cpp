@@ -17,7 +17,7 @@ namespace {
 // A handler can reach only globals: the eventfd of each Interrupt that exists, the outer one first.
 std::array<std::atomic<int>, 2> requests{-1, -1};
 
-extern "C" void on_signal(int /*number*/) {
+void on_signal(int /*number*/) {
   const int saved = errno;
   const std::uint64_t one = 1;
   for (const auto& request : requests)

@@ -40,6 +40,8 @@ constexpr yako_rtu::SimulatedModel model{
 
 }  // namespace
 
+/// Called by the list of all models, which is made from their folders.
+std::span<const simulation::Simulator> simulators();
 std::span<const simulation::Simulator> simulators() { return yako_rtu::simulators_of<model>(); }
 
 }  // namespace axisd::ess42_r
