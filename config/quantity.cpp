@@ -142,25 +142,41 @@ std::optional<int> parse_exponent(std::string_view text) {
   return fits && std::abs(exponent) <= 100 ? std::optional(exponent) : std::nullopt;
 }
 
+/// What stands before the e, without its sign, as an integer and a power of ten; and where it ends.
+struct Digits {
+  std::int64_t numerator = 0;
+  int exponent = 0;
+  std::size_t end = 0;
+};
+
+/// Nothing: more digits than fit.
+std::optional<Digits> read_digits(std::string_view text) {
+  Digits read{.end = text.front() == '+' || text.front() == '-' ? 1U : 0U};
+  int digits = 0;
+  bool fraction = false;
+  for (; read.end < text.size() && (is_digit(text[read.end]) || text[read.end] == '.'); ++read.end) {
+    const char c = text[read.end];
+    if (c == '.') {
+      fraction = true;
+      continue;
+    }
+    if (read.numerator != 0 || c != '0') ++digits;
+    if (digits > 18) return std::nullopt;
+    read.numerator = read.numerator * 10 + (c - '0');
+    read.exponent -= fraction ? 1 : 0;
+  }
+  return read;
+}
+
 }  // namespace
 
 QuantityResult<Decimal> parse_decimal(std::string_view text) {
   const auto all = trim(text);
   if (all.empty() || decimal_length(all) != all.size()) return not_a_number(text);
 
-  std::int64_t numerator = 0;
-  int exponent = 0, digits = 0;
-  std::size_t at = all.front() == '+' || all.front() == '-' ? 1 : 0;
-  for (bool fraction = false; at < all.size() && (is_digit(all[at]) || all[at] == '.'); ++at) {
-    if (all[at] == '.') {
-      fraction = true;
-      continue;
-    }
-    if (numerator != 0 || all[at] != '0') ++digits;
-    if (digits > 18) return too_long(text);
-    numerator = numerator * 10 + (all[at] - '0');
-    exponent -= fraction ? 1 : 0;
-  }
+  const auto digits = read_digits(all);
+  if (!digits) return too_long(text);
+  auto [numerator, exponent, at] = *digits;
   if (at < all.size()) {
     const auto written = parse_exponent(all.substr(at + 1));
     if (!written) return all[at + 1] == '-' ? too_long(text) : too_large(text);

@@ -69,8 +69,7 @@ grpc::StatusCode status_code(Reason reason) {
     case Reason::limit_switch:
     case Reason::alarm:
     case Reason::refused:
-    // Normally the cause of a command's end. As the answer of a call: look at the machine before repeating
-    // it.
+    // Normally the cause of a command's end. As the answer of a call: look at the machine first.
     case Reason::terminal:
     case Reason::did_not_start:
     case Reason::not_reached:
