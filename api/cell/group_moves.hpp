@@ -54,7 +54,7 @@ class GroupMoves {
   static constexpr int most_targets = 1024;
   /// Of all that have ended and are remembered.
   static constexpr int most_ended_targets = 16 * most_targets;
-  static constexpr std::size_t longest_name = 64, most_bytes = 256 * 1024;
+  static constexpr std::size_t longest_name = 64, most_bytes = std::size_t{256} * 1024;
 
  private:
   struct Run;
