@@ -40,7 +40,8 @@ struct Way {
 /// of the call alone, of StopService there and of `service` here. Thread: core.
 template <class Response, class Done>
 void ask_lane_first(const boost::asio::any_io_executor& core, const Way& way, const std::string& service,
-                    const Question& question, const google::protobuf::MessageLite& request, Done done) {
+                    const Question& question, const google::protobuf::MessageLite& request,
+                    const Done& done) {
   const auto until = monotonic_now() + question.timeout;
   const auto of = [question](std::string_view of_service, Duration left) {
     return Question{.path = fmt::format("/axisd.v1.{}/{}", of_service, question.path),
