@@ -186,7 +186,8 @@ Task<Result<void>> Axis::prove_or_configure() {
     if (!proof && proof.error().reason != Reason::rebooted) co_return proof;
     if (!proof && link_.is_configured()) on_reboot(proof.error());
     // Also where an earlier run of the daemon knew the drive (M1). If that does not count from 0, that run
-    // has died before it kept what it wrote last.
+    // has died before it kept what it wrote last. A driver that knows no canary yet would never say so:
+    // here only the counter is asked.
     const bool counts_on = drive_->Drive::rules_out_restart(*sample_) && !may_move_by_itself();
     if (!proof && !counts_on) power_.restarted();
     if (restorable && (!proof || restorable->trust == PositionTrust::unknown)) {
