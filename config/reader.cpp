@@ -4,7 +4,9 @@
 
 #include <algorithm>
 
+#include "config/quantity.hpp"
 #include "config/text.hpp"
+#include "config/unit_conversion.hpp"
 #include "config/value.hpp"
 
 namespace axisd::config {
@@ -31,6 +33,15 @@ std::string sections_with(std::span<const KeySpec> keys, std::string_view key) {
     if (spec.kind == Kind::section && find(spec.children, key) != nullptr) sections.push_back(spec.key);
   }
   return alternatives(sections);
+}
+
+/// "mm" of an axis with `scale: { travel: 5 mm/rev }`; empty: it has none that can be read.
+std::string unit_of_travel(const Node& axis) {
+  const auto* scale = axis.find("scale");
+  const auto* travel = scale == nullptr ? nullptr : scale->find("travel");
+  if (travel == nullptr || travel->kind != Node::Kind::scalar) return {};
+  const auto quantity = parse_quantity(travel->text);
+  return quantity ? quantity->unit.substr(0, quantity->unit.find('/')) : std::string();
 }
 
 }  // namespace
@@ -71,6 +82,18 @@ void Reader::read(const Node& root) {
     return;
   }
   read_section(root, root.mark, schema(), "");
+}
+
+void Reader::check_unit(const Node& axis, const std::string& path) {
+  const auto* unit = axis.find("unit");
+  if (unit == nullptr || unit->kind != Node::Kind::scalar || !matches(unit->text, "[A-Za-z]{1,16}") ||
+      !units_like(unit->text).empty())
+    return;  // usual, or told as no unit at all
+  const auto travel = unit_of_travel(axis);
+  if (travel == unit->text || units_like(travel).empty()) return;
+  report(join(path, "unit"), unit->mark,
+         fmt::format("{} is no usual unit, and scale.travel is in {}", quoted(unit->text), travel),
+         fmt::format("write unit: {}, or give travel in {}", travel, printable(unit->text)));
 }
 
 void Reader::read_section(const Node& node, Mark where, std::span<const KeySpec> keys,
@@ -221,6 +244,7 @@ void Reader::read_sections(const KeySpec& spec, const Node& value, const std::st
     if (!name || !check_is_section(section, key.text, here)) continue;
     const auto outside = target_;
     spec.apply(target_, *name);
+    if (target_.axis != nullptr && outside.axis == nullptr) check_unit(section, here);
     read_section(section, key.mark, spec.children, here);
     if (spec.one_of) check_one_of(spec, key, section, here);
     target_ = outside;

@@ -51,6 +51,8 @@ class Reader {
     const Node& value;
   };
 
+  /// Reports a unit that nothing of the axis is written in: once, in place of each of its values.
+  void check_unit(const Node& axis, const std::string& path);
   void read_section(const Node& node, Mark where, std::span<const KeySpec> keys, const std::string& path);
   void check_keys(std::span<const Entry> entries, std::span<const KeySpec> keys, const std::string& path,
                   std::set<std::string_view>& probably_meant);

@@ -57,6 +57,7 @@ LOADER_ONLY = {
     "times",
     "too_many_can_drives",
     "too_many_drives",
+    "unit_of_nothing",
     "unknown_bus",
     "velocity_too_high",
     "velocity_too_low",
