@@ -117,7 +117,5 @@ std::size_t choice_index(std::span<const std::string_view> choices, std::string_
 std::span<const std::string_view> homing_methods();
 /// Parts of `persist`.
 inline constexpr std::string_view persist_parts[] = {"terminals", "segments", "homing", "drive"};
-/// Numbers of segments in the drives' tables (RTU manuals 6.1, 0x0090..0x00EF).
-inline constexpr int last_segment = 16;
 
 }  // namespace axisd::config

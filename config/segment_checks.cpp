@@ -122,7 +122,7 @@ void AxisChecks::check_targets() {
 }
 
 void AxisChecks::share_times() {
-  // Both tables have one acceleration time per number (0x00C0 + i).
+  // Both tables have one acceleration time per number.
   for (auto& position : axis_.segments->positions) {
     const auto velocity =
         std::ranges::find(axis_.segments->velocities, position.number, &VelocitySegment::number);

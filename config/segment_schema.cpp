@@ -1,4 +1,8 @@
+#include <algorithm>
+#include <array>
+
 #include "config/schema.hpp"
+#include "devices/descriptor.hpp"
 
 // The keys of an axis's segments. What depends on the model or on other keys is in segment_checks.cpp.
 namespace axisd::config {
@@ -47,40 +51,52 @@ constexpr KeySpec velocity_keys[] = {
      .apply = [](Target& t, const Value& v) { t.velocity_segment->acceleration_time = v.duration; }},
 };
 
-constexpr KeySpec segment_keys[] = {
-    {.key = "mode",
-     .kind = Kind::choice,
-     .description = "What the targets of positions mean: distances, or positions that count from home.",
-     .example = "absolute",
-     .default_value = "relative",
-     .choices = modes,
-     .apply = [](Target& t, const Value& v) { t.axis->axis.segments->absolute = v.text == "absolute"; }},
-    {.key = "positions",
-     .kind = Kind::numbered_sections,
-     .description = "Moves, by the number that pin0..pin4 select; started by an input with pt_enable.",
-     .minimum = 1,
-     .maximum = last_segment,
-     .children = position_keys,
-     .apply =
-         [](Target& t, const Value& v) {
-           t.position_segment = &t.axis->axis.segments->positions.emplace_back();
-           t.position_segment->number = static_cast<int>(v.integer);
-         }},
-    {.key = "velocities",
-     .kind = Kind::numbered_sections,
-     .description = "Velocities, by the number that pin0..pin4 select; run by an input with pv_enable.",
-     .minimum = 1,
-     .maximum = last_segment,
-     .children = velocity_keys,
-     .apply =
-         [](Target& t, const Value& v) {
-           t.velocity_segment = &t.axis->axis.segments->velocities.emplace_back();
-           t.velocity_segment->number = static_cast<int>(v.integer);
-         }},
-};
+/// As many as the longest table of all models has.
+int last_segment() {
+  int last = 0;
+  for (const auto* model : drive_models()) last = std::max(last, model->capabilities.maximum_segments);
+  return last;
+}
+
+auto segment_keys(int last) {
+  return std::to_array<KeySpec>({
+      {.key = "mode",
+       .kind = Kind::choice,
+       .description = "What the targets of positions mean: distances, or positions that count from home.",
+       .example = "absolute",
+       .default_value = "relative",
+       .choices = modes,
+       .apply = [](Target& t, const Value& v) { t.axis->axis.segments->absolute = v.text == "absolute"; }},
+      {.key = "positions",
+       .kind = Kind::numbered_sections,
+       .description = "Moves, by the number that pin0..pin4 select; started by an input with pt_enable.",
+       .minimum = 1,
+       .maximum = last,
+       .children = position_keys,
+       .apply =
+           [](Target& t, const Value& v) {
+             t.position_segment = &t.axis->axis.segments->positions.emplace_back();
+             t.position_segment->number = static_cast<int>(v.integer);
+           }},
+      {.key = "velocities",
+       .kind = Kind::numbered_sections,
+       .description = "Velocities, by the number that pin0..pin4 select; run by an input with pv_enable.",
+       .minimum = 1,
+       .maximum = last,
+       .children = velocity_keys,
+       .apply =
+           [](Target& t, const Value& v) {
+             t.velocity_segment = &t.axis->axis.segments->velocities.emplace_back();
+             t.velocity_segment->number = static_cast<int>(v.integer);
+           }},
+  });
+}
 
 }  // namespace
 
-std::span<const KeySpec> segment_schema() { return segment_keys; }
+std::span<const KeySpec> segment_schema() {
+  static const auto keys = segment_keys(last_segment());
+  return keys;
+}
 
 }  // namespace axisd::config

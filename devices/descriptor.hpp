@@ -94,13 +94,28 @@ struct SettingSpec {
   bool required = false;
 };
 
+/// One read of holding registers (FC03).
+struct RtuRead {
+  std::uint16_t address = 0;
+  std::uint16_t count = 1;
+  bool operator==(const RtuRead&) const = default;
+};
+
 /// How a Modbus RTU model is told from others, and how it is set (for identification and the bus scan).
 struct RtuIdentification {
-  std::span<const std::uint16_t> model_codes;   ///< of register 0x0000
+  /// What shows the model. Silence means that nobody is there: who has no such registers refuses the read, as
+  /// Modbus demands.
+  RtuRead read{};
+  std::uint16_t code_at = 0;  ///< which of the registers read is the model's code
+  std::span<const std::uint16_t> model_codes{};
+  /// From the registers read; nullptr: they tell no version.
+  std::string (*version)(std::span<const std::uint16_t> registers) = nullptr;
   std::optional<std::uint16_t> has_register{};  ///< read to tell models with the same code apart
   std::optional<std::uint16_t> lacks_register{};
-  std::uint16_t microstep_register = 0x0011;
-  std::span<const std::int32_t> microstep_codes;  ///< pulses per revolution in the order of the codes
+  /// The exception by which it says that a frame was damaged, and nothing of the register that was asked for.
+  std::optional<std::uint8_t> damaged_frame{};
+  std::optional<std::uint16_t> microstep_register{};
+  std::span<const std::int32_t> microstep_codes{};  ///< pulses per revolution in the order of the codes
 };
 
 /// How a CANopen model is told from others: its device type (1000h) and identity (1018h).

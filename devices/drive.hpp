@@ -1,7 +1,7 @@
 // The contract between an axis and the model-specific code that speaks to one node.
 #pragma once
 
-#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <cstdlib>
 #include <functional>
@@ -82,7 +82,8 @@ struct HomingProfile {
   std::optional<std::int8_t> number{};  ///< in place of `method`: the drive's own; drive direction
 };
 
-/// The drive's segment table in drive units and direction; index 0 is segment 1, unset ones are 0.
+/// The drive's segment table in drive units and direction; index 0 is segment 1, unset ones are 0. As many
+/// rows as the model has (Capabilities::maximum_segments), or more that only the drive itself can select.
 struct DriveSegments {
   struct Row {
     std::int32_t pulses = 0;
@@ -92,7 +93,7 @@ struct DriveSegments {
     bool operator==(const Row&) const = default;
   };
   bool absolute = false;
-  std::array<Row, 16> rows{};
+  std::vector<Row> rows{};
   bool operator==(const DriveSegments&) const = default;
 };
 
@@ -123,8 +124,10 @@ struct Drift {
 };
 
 /// Contents of drive memory that no power-up leaves behind: finding them proves that the drive kept its
-/// memory, and with it its position and configuration (M6, M7, M20).
-using ContinuityMark = std::array<std::uint16_t, 6>;
+/// memory, and with it its position and configuration (M6, M7, M20). The model chooses what it is, and how
+/// long, up to `longest_mark`. Empty: none. Never zeros alone, nor restart_mark().
+using ContinuityMark = std::vector<std::uint16_t>;
+inline constexpr std::size_t longest_mark = 16;
 
 /// A positioning move of which all but the trigger stands in the drive, verified (M6, M22). Nothing of it
 /// waits there: dropping it leaves nothing behind. It does not outlive its drive. Thread: core.

@@ -2,7 +2,6 @@
 // business.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <functional>
 #include <map>
@@ -14,6 +13,7 @@
 #include "buses/error.hpp"
 #include "devices/axis/snapshot.hpp"
 #include "devices/axis/stop_holds.hpp"
+#include "devices/drive.hpp"
 #include "devices/kept_state.hpp"
 
 namespace axisd {
@@ -23,7 +23,7 @@ namespace axisd {
 struct OffsetRecord {
   std::int64_t offset_pulses = 0;                ///< axis position in pulses = unwrapped counter + offset
   PositionTrust trust = PositionTrust::unknown;  ///< as it was; only the axis may turn it into `restored`
-  std::array<std::uint16_t, 6> canary{};         ///< what 0x0020..0x0025 were last written with (M6)
+  ContinuityMark canary{};                       ///< what the drive's memory holds (M6); empty: not known
   std::int64_t last_position_pulses = 0;         ///< the drive's counter at standstill when this was saved
   std::int64_t pulses_per_revolution = 0;        ///< another value in the configuration voids the record
   bool invert = false;                           ///< likewise

@@ -12,8 +12,7 @@ namespace axisd::core {
 
 namespace {
 
-constexpr std::uint16_t identity_register = 0x0000;  // model code, then version: all RTU manuals, 6.1
-constexpr int longest_quiet = 16;                    // probes without a report
+constexpr int longest_quiet = 16;  // probes without a report
 constexpr int garbled_attempts = 3;
 constexpr int last_address = 247;  // Modbus over serial line 2.2
 constexpr int slowest = 1200, fastest = 1'000'000;
@@ -120,28 +119,31 @@ Task<Result<ScanProgress>> BusScan::next() {
   co_return progress;
 }
 
+/// Reads one after the other what may show its model. Who does not answer the first is not there.
 Task<Result<std::optional<FoundNode>>> BusScan::look(Probe probe) {
-  const auto heard = co_await ask(probe, identity_register, 2);
-  if (!heard) co_return fail(heard.error());
-  if (!heard->answered && !heard->garbled) co_return std::nullopt;
-  FoundNode found{.node = probe.node,
-                  .baud = probe.serial.baud,
-                  .format = probe.serial.format,
-                  .configured_as = configured_as(*machine_, bus_->settings().name, probe.node)};
-  if (heard->garbled)
-    found.note = "garbled replies: two nodes on one address? Else check wiring and termination";
-  if (!heard->registers.empty()) {
-    found.model_code = heard->registers[0];
-    found.version = fmt::format("V{}.{}", heard->registers[1] >> 8U, (heard->registers[1] >> 4U) & 0xFU);
-    if (const auto identified = co_await identify(probe, found); !identified)
-      co_return fail(identified.error());
+  FoundNode found{.node = probe.node, .baud = probe.serial.baud, .format = probe.serial.format};
+  bool is_there = false;
+  for (const auto read : rtu_identity_reads()) {
+    const auto heard = co_await ask(probe, read);
+    if (!heard) co_return fail(heard.error());
+    is_there = is_there || heard->answered || heard->garbled;
+    if (heard->garbled)
+      found.note = "garbled replies: two nodes on one address? Else check wiring and termination";
+    if (!heard->answered) break;
+    if (heard->registers.empty()) continue;  // it has none of these registers
+    if (found.model_code == 0) found.model_code = heard->registers.front();
+    const auto identified = co_await identify(probe, read, heard->registers, found);
+    if (!identified) co_return fail(identified.error());
+    if (*identified) break;
   }
+  if (!is_there) co_return std::nullopt;
+  found.configured_as = configured_as(*machine_, bus_->settings().name, probe.node);
   co_return found;
 }
 
 /// One read; repeated while damaged bytes come back.
-Task<Result<BusScan::Heard>> BusScan::ask(Probe probe, std::uint16_t address, std::uint16_t count) {
-  const modbus_rtu::Request request{.node = probe.node, .address = address, .count = count};
+Task<Result<BusScan::Heard>> BusScan::ask(Probe probe, RtuRead read) {
+  const modbus_rtu::Request request{.node = probe.node, .address = read.address, .count = read.count};
   Heard heard;
   for (int attempt = 0; attempt < garbled_attempts; ++attempt) {
     if (const auto quiet = check_quiet(probe.serial); !quiet) co_return fail(quiet.error());
@@ -168,28 +170,35 @@ Task<Result<BusScan::Heard>> BusScan::ask(Probe probe, std::uint16_t address, st
   co_return heard;
 }
 
-/// Names the model and its setting, as far as both can be told.
-Task<Result<void>> BusScan::identify(Probe probe, FoundNode& found) {
-  if (const auto quiet = check_quiet(probe.serial); !quiet) co_return quiet;
-  const auto model =
-      co_await find_rtu_model(modbus_rtu::Node(*bus_, probe.node), found.model_code, options(probe));
+/// Names the model and its setting, as far as both can be told by `registers`, the answer to `read`. False:
+/// another read may show more.
+Task<Result<bool>> BusScan::identify(Probe probe, RtuRead read, std::vector<std::uint16_t> registers,
+                                     FoundNode& found) {
+  if (const auto quiet = check_quiet(probe.serial); !quiet) co_return fail(quiet.error());
+  const auto models = rtu_models_with_code(read, registers);
+  if (models.empty()) co_return false;
+  const auto tell = [&](const RtuIdentification& by) {
+    found.model_code = registers.at(by.code_at);
+    found.version = by.version != nullptr ? by.version(registers) : std::string();
+  };
+  const auto model = co_await find_fitting_model(modbus_rtu::Node(*bus_, probe.node), models, options(probe));
   if (!model && model.error().reason == Reason::no_reply) {
     if (found.note.empty()) found.note = "it did not answer all reads: its model is not certain";
-    co_return Result<void>{};
+    tell(models.front()->identification);
+    co_return true;
   }
   if (!model) co_return fail(model.error());
-  if (*model == nullptr) {
-    found.version.clear();  // of another maker: who knows what the register holds
-    co_return Result<void>{};
-  }
-  found.model = (*model)->model;
+  if (*model == nullptr) co_return false;
   const auto& identification = (*model)->identification;
-  const auto microstep = co_await ask(probe, identification.microstep_register, 1);
+  found.model = (*model)->model;
+  tell(identification);
+  if (!identification.microstep_register) co_return true;
+  const auto microstep = co_await ask(probe, {.address = *identification.microstep_register});
   if (!microstep) co_return fail(microstep.error());
   const auto& codes = identification.microstep_codes;
   if (!microstep->registers.empty() && microstep->registers[0] < codes.size())
     found.pulses_per_revolution = codes[microstep->registers[0]];
-  co_return Result<void>{};
+  co_return true;
 }
 
 std::string configured_as(const MachineCore& machine, const std::string& bus, std::uint8_t node) {

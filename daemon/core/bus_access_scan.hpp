@@ -10,6 +10,7 @@
 #include "buses/task.hpp"
 #include "daemon/core/machine_core.hpp"
 #include "devices/bus_access.hpp"
+#include "devices/descriptor.hpp"
 
 namespace axisd::core {
 
@@ -25,9 +26,9 @@ class NodeScan {
 [[nodiscard]] std::string configured_as(const MachineCore& machine, const std::string& bus,
                                         std::uint8_t node);
 
-/// Looks for nodes of an RS-485 line: one read of 0x0000..0x0001 per node, baud and format, in class `scan`,
-/// and a few reads more of what answers. Never writes. Takes at most probes x (reply timeout + margin of the
-/// bus + wire time), and what other transactions take meanwhile. Thread: core.
+/// Looks for nodes of an RS-485 line: one read per node, baud and format, in class `scan`, and a few reads
+/// more of what answers, until one shows a model that is known here. Never writes. Takes at most probes x
+/// (reply timeout + margin of the bus + wire time), and what other transactions take meanwhile. Thread: core.
 class BusScan final : public NodeScan {
  public:
   /// `machine` and `bus` outlive it. Nothing more is sent once `wanted` has expired.
@@ -54,8 +55,9 @@ class BusScan final : public NodeScan {
   [[nodiscard]] Probe probe_at(int index) const;
   [[nodiscard]] TransactionOptions options(const Probe& probe) const;
   Task<Result<std::optional<FoundNode>>> look(Probe probe);
-  Task<Result<Heard>> ask(Probe probe, std::uint16_t address, std::uint16_t count);
-  Task<Result<void>> identify(Probe probe, FoundNode& found);
+  Task<Result<Heard>> ask(Probe probe, RtuRead read);
+  Task<Result<bool>> identify(Probe probe, RtuRead read, std::vector<std::uint16_t> registers,
+                              FoundNode& found);
 
   const MachineCore* machine_;
   modbus_rtu::RtuBus* bus_;

@@ -149,7 +149,7 @@ struct Encode {
     auto text = fmt::format("sending {} granted={} start={} target={} tolerance={}", head(line.command),
                             text_of(line.command.granted), text_of(note.start_pulses),
                             text_of(note.target_pulses), note.tolerance_pulses);
-    for (const auto& mark : note.marks) text += fmt::format(" mark={:04x}", fmt::join(mark, "."));
+    for (const auto& mark : note.marks) text += " mark=" + mark_text(mark);
     return text;
   }
   std::string operator()(const EndedLine& line) const {
@@ -211,11 +211,8 @@ bool read_sending(Reader& reader, SendingLine& line) {
       !reader.literal("target=") || !reader.read(note.target_pulses, pulses, " ") ||
       !reader.literal("tolerance=") || !reader.number(note.tolerance_pulses))
     return false;
-  while (reader.literal(" mark=")) {
-    auto& mark = note.marks.emplace_back();
-    for (std::size_t i = 0; i < mark.size(); ++i)
-      if ((i > 0 && !reader.literal(".")) || !reader.number(mark.at(i), 16)) return false;
-  }
+  while (reader.literal(" mark="))
+    if (!reader.mark(note.marks.emplace_back())) return false;
   return true;
 }
 

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 
 namespace axisd::store {
@@ -40,6 +41,20 @@ std::string escape(std::string_view text) {
       out += fmt::format("%{:02x}", static_cast<unsigned char>(c));
   }
   return out;
+}
+
+std::string mark_text(const ContinuityMark& mark) {
+  static const ContinuityMark none(6, 0);
+  return fmt::format("{:04x}", fmt::join(mark.empty() ? none : mark, "."));
+}
+
+bool LineReader::mark(ContinuityMark& value) {
+  value.clear();
+  do {
+    if (value.size() == longest_mark || !number(value.emplace_back(), 16)) return false;
+  } while (literal("."));
+  if (std::ranges::all_of(value, [](auto word) { return word == 0; })) value.clear();
+  return true;
 }
 
 bool LineReader::word(std::string& value) {

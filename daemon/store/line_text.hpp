@@ -6,6 +6,8 @@
 #include <string>
 #include <string_view>
 
+#include "devices/drive.hpp"
+
 namespace axisd::store {
 
 /// CRC-32 as in IEEE 802.3: finds every error burst of up to 32 bits, so every flipped bit.
@@ -13,6 +15,9 @@ std::uint32_t crc32(std::string_view bytes);
 
 /// Free text as one word: whatever could end a word or a line is written as %XX.
 std::string escape(std::string_view text);
+/// Words in hexadecimal with points between them; none at all as six zeros, which releases before this one
+/// need.
+std::string mark_text(const ContinuityMark& mark);
 /// Is written as itself.
 bool plain(char c);
 
@@ -52,6 +57,8 @@ class LineReader {
     if (negative) value = -value;
     return true;
   }
+  /// As mark_text() writes it.
+  bool mark(ContinuityMark& value);
   [[nodiscard]] bool at_end() const { return rest_.empty(); }
 
  private:

@@ -77,11 +77,8 @@ bool read_offset(Reader& reader, OffsetRecord& offset) {
       !reader.trust(offset.trust) || !reader.literal(" last=") ||
       !reader.number(offset.last_position_pulses) || !reader.literal(" per_rev=") ||
       !reader.number(offset.pulses_per_revolution) || !reader.literal(" invert=") ||
-      !reader.flag(offset.invert) || !reader.literal(" canary="))
+      !reader.flag(offset.invert) || !reader.literal(" canary=") || !reader.mark(offset.canary))
     return false;
-  for (std::size_t i = 0; i < offset.canary.size(); ++i) {
-    if ((i > 0 && !reader.literal(".")) || !reader.number(offset.canary[i], 16)) return false;
-  }
   return reader.literal("\n");
 }
 
@@ -163,9 +160,9 @@ std::optional<Generation> read_generation(std::string_view body) {
 }
 
 std::string offset_line(const OffsetRecord& offset) {
-  return fmt::format("offset pulses={} trust={} last={} per_rev={} invert={:d} canary={:04x}\n",
+  return fmt::format("offset pulses={} trust={} last={} per_rev={} invert={:d} canary={}\n",
                      offset.offset_pulses, trust_word(offset.trust), offset.last_position_pulses,
-                     offset.pulses_per_revolution, offset.invert, fmt::join(offset.canary, "."));
+                     offset.pulses_per_revolution, offset.invert, mark_text(offset.canary));
 }
 
 std::string saves_line(const EepromRecord& eeprom) {

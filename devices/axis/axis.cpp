@@ -281,7 +281,7 @@ OffsetRecord Axis::offset_record(std::int64_t offset, PositionTrust trust) const
                       .pulses_per_revolution = settings_.scale.pulses_per_revolution,
                       .invert = settings_.scale.invert};
   if (const auto mark = drive_->continuity_mark()) record.canary = *mark;
-  if (power_.state() == PowerMachine::State::restarted) record.canary = restart_mark;
+  if (power_.state() == PowerMachine::State::restarted) record.canary = restart_mark();
   return record;
 }
 

@@ -226,14 +226,14 @@ std::optional<OffsetRecord> Axis::restorable_position() {
   const auto found = axes.find(settings_.name);
   auto record = found == axes.end() ? std::nullopt : found->second.offset;
   if (!record) return std::nullopt;
-  if (record->canary == restart_mark) {  // kept until somebody enables it (M1)
+  if (record->canary == restart_mark()) {  // kept until somebody enables it (M1)
     power_.restarted();
     earlier_.tried();
     return std::nullopt;
   }
   // By the journal it has proven it already, and holds what was written for a motion since.
   const auto found_there = drive_->continuity_mark();
-  if (record->canary == ContinuityMark{} || (found_there && *found_there != record->canary)) {
+  if (record->canary.empty() || (found_there && *found_there != record->canary)) {
     void_saved_position();
     return std::nullopt;
   }

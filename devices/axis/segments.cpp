@@ -25,7 +25,9 @@ double zero_of(const AxisSettings& axis) { return axis.homing ? axis.homing->pos
 class Rows {
  public:
   Rows(const AxisSettings& axis, const Scale& scale, const Capabilities& capabilities)
-      : axis_(&axis), scale_(&scale), capabilities_(&capabilities) {}
+      : axis_(&axis), scale_(&scale), capabilities_(&capabilities) {
+    table_.rows.resize(static_cast<std::size_t>(capabilities.maximum_segments));
+  }
 
   Result<void> add(const PositionSegment& segment, bool absolute);
   Result<void> add(const VelocitySegment& segment);
@@ -75,7 +77,7 @@ Result<void> Rows::set_time(int number, DriveSegments::Row& row, Duration time) 
     return fail(out_of_range(number, "acceleration_time is not possible", static_cast<double>(least.count()),
                              static_cast<double>(most.count()), "ms"));
   const auto rounded = std::chrono::round<std::chrono::milliseconds>(time);
-  // One register serves both tables (7.4).
+  // A row has one time for both tables.
   if (!timed_.insert(number).second && row.acceleration_time != rounded)
     return fail(Reason::invalid_argument,
                 fmt::format("segment {}: position and velocity segment share one acceleration_time", number),

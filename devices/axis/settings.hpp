@@ -46,7 +46,7 @@ struct VelocitySegment {
 };
 
 struct SegmentSettings {
-  bool absolute = false;  ///< 0x0026: what position segments and moves started by terminals mean
+  bool absolute = false;  ///< what position segments and moves started by terminals mean
   std::vector<PositionSegment> positions{};
   std::vector<VelocitySegment> velocities{};
   bool operator==(const SegmentSettings&) const = default;
@@ -72,7 +72,7 @@ struct LimitSettings {
   double velocity = 0;                                       ///< user units per second, > 0, required
   Duration acceleration_time = milliseconds(100);  ///< from start speed to velocity; the drives take a time
   std::optional<Duration> deceleration_time;       ///< default: acceleration_time
-  int start_speed_rpm = 5;                         ///< r/min, 0x0020 of the RS-485 models
+  int start_speed_rpm = 5;                         ///< r/min
   std::uint64_t eeprom_saves_per_day = 100;        ///< > 0, of what EepromBudget counts
 };
 
@@ -82,7 +82,7 @@ struct HomingSettings {
   double search_velocity = 0;  ///< user units per second
   Duration acceleration_time = milliseconds(100);
   double position = 0;               ///< position at home, user units
-  double offset = 0;                 ///< signed compensation after home, user units (0x0035/0x0036)
+  double offset = 0;                 ///< signed compensation after home, user units
   std::optional<double> backoff;     ///< bounded move away from an already active switch, user units > 0
   std::optional<double> max_travel;  ///< user units > 0
   Duration timeout = std::chrono::seconds(60);

@@ -70,9 +70,9 @@ std::span<const DriveDescriptor> descriptors() {
                        .closed_loop = true,
                        .communication_watchdog = false},
       // The SSD2608PR has the same code, and Y2.
-      .identification = {.model_codes = model_codes,
-                         .lacks_register = 0x004E,
-                         .microstep_codes = yako_rtu::closed_loop_microsteps},
+      .identification = yako_rtu::identified({.model_codes = model_codes,
+                                              .lacks_register = 0x004E,
+                                              .microstep_codes = yako_rtu::closed_loop_microsteps}),
       .rtu_transactions = yako_rtu::transactions,
       .make = &make,
   }};

@@ -87,9 +87,9 @@ std::span<const DriveDescriptor> descriptors() {
                        .closed_loop = true,
                        .communication_watchdog = false},
       // The ESS42-R has the same code, and no Y2.
-      .identification = {.model_codes = model_codes,
-                         .has_register = 0x004E,
-                         .microstep_codes = yako_rtu::closed_loop_microsteps},
+      .identification = yako_rtu::identified({.model_codes = model_codes,
+                                              .has_register = 0x004E,
+                                              .microstep_codes = yako_rtu::closed_loop_microsteps}),
       .rtu_transactions = yako_rtu::transactions,
       .make = &make,
   }};

@@ -1,5 +1,7 @@
 #include "devices/yako_rtu/codec.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <utility>
 
@@ -63,6 +65,20 @@ HomingBlock encode(const HomingProfile& profile) {
           milliseconds_of(profile.acceleration_time),
           static_cast<std::uint16_t>(offset > 0 ? offset : 0),
           static_cast<std::uint16_t>(offset < 0 ? -offset : 0)};
+}
+
+ContinuityMark mark_of(const MotionBlock& block) { return {block.begin(), block.end()}; }
+
+std::vector<MotionBlock> blocks_of(const std::vector<ContinuityMark>& marks) {
+  std::vector<MotionBlock> blocks;
+  for (const auto& mark : marks)
+    if (mark.size() == canary_count) std::ranges::copy(mark, blocks.emplace_back().begin());
+  return blocks;
+}
+
+std::string version_text(std::span<const std::uint16_t> identity) {
+  const auto version = identity[1];
+  return fmt::format("V{}.{}", version >> 8U, (version >> 4U) & 0xFU);
 }
 
 const char* exception_text(std::uint32_t code) {

@@ -4,6 +4,8 @@
 #include <array>
 #include <cstdint>
 #include <span>
+#include <string>
+#include <vector>
 
 #include "devices/drive.hpp"
 
@@ -28,6 +30,12 @@ MotionBlock encode(const VelocityProfile& profile);
 HomingBlock encode(const HomingProfile& profile);
 /// Counter value to which such a block sends the drive, or by how much.
 std::int64_t target_of(const MotionBlock& block);
+/// "V1.2", of what 0x0000 and 0x0001 hold (6.1).
+std::string version_text(std::span<const std::uint16_t> identity);
+/// As it is kept on the disk.
+ContinuityMark mark_of(const MotionBlock& block);
+/// Those that are as long as the block is; no other can be this drive's.
+std::vector<MotionBlock> blocks_of(const std::vector<ContinuityMark>& marks);
 /// The vendor's exception codes (6.2.4), which are not those of the Modbus standard.
 const char* exception_text(std::uint32_t code);
 /// What to do about it.

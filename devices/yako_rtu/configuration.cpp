@@ -92,7 +92,9 @@ std::vector<RegisterSetting> segment_registers(const DriveSegments& segments, st
                    .starts_motion = true,
                    .input_bits = enables});
   };
-  const auto& rows = segments.rows;
+  // Also those that the inputs cannot select.
+  auto rows = segments.rows;
+  rows.resize(reg::segment_rows);
   for (std::size_t i = 0; i < rows.size(); ++i) add(reg::segment_pulses_high, i, rows.at(i).pulses >> 16);
   for (std::size_t i = 0; i < rows.size(); ++i) add(reg::segment_pulses_low, i, rows.at(i).pulses);
   for (std::size_t i = 0; i < rows.size(); ++i)

@@ -44,10 +44,10 @@ class YakoRtuDrive final : public Drive {
   // drive_motion.cpp
   Task<Result<void>> check_continuity(TransactionClass transaction_class) override;
   [[nodiscard]] std::optional<ContinuityMark> continuity_mark() const override {
-    return canary_.is_known() ? std::optional(canary_.blocks().front()) : std::nullopt;
+    return canary_.is_known() ? std::optional(mark_of(canary_.blocks().front())) : std::nullopt;
   }
   void expect_marks(const std::vector<ContinuityMark>& marks) override {
-    canary_.expect(marks);
+    canary_.expect(blocks_of(marks));
     proven_at_.reset();
   }
   [[nodiscard]] bool rules_out_restart(const DriveSample& sample) const override;

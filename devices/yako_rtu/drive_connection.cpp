@@ -77,11 +77,11 @@ Error YakoRtuDrive::wrong_model(std::uint16_t code, const std::string& found) co
 }
 
 Task<Result<DriveIdentity>> YakoRtuDrive::identify(TransactionClass transaction_class) {
-  const auto answer = co_await node_.read(reg::model, 2, in(transaction_class));
+  const auto& identification = model_->descriptor->identification;
+  const auto answer =
+      co_await node_.read(identification.read.address, identification.read.count, in(transaction_class));
   if (!answer) co_return failed(answer.error());
   const auto code = answer->registers[0];
-  const auto version = answer->registers[1];
-  const auto& identification = model_->descriptor->identification;
   const auto setting = setup_.model_settings.find("model_code");
   const auto* wanted =
       setting == setup_.model_settings.end() ? nullptr : std::get_if<std::int64_t>(&setting->second);
@@ -94,12 +94,12 @@ Task<Result<DriveIdentity>> YakoRtuDrive::identify(TransactionClass transaction_
     fits = *probed;
   }
   if (!fits) {
-    const auto found = co_await find_rtu_model(node_, code, in(transaction_class));
+    auto models = rtu_models_with_code(identification.read, answer->registers);
+    const auto found = co_await find_fitting_model(node_, std::move(models), in(transaction_class));
     if (!found) co_return failed(found.error());
     co_return fail(wrong_model(code, *found == nullptr ? "unknown" : std::string((*found)->model)));
   }
-  co_return DriveIdentity{.model_code = code,
-                          .version = fmt::format("V{}.{}", version >> 8U, (version >> 4U) & 0xFU)};
+  co_return DriveIdentity{.model_code = code, .version = version_text(answer->registers)};
 }
 
 bool YakoRtuDrive::closed_loop() const {

@@ -141,8 +141,9 @@ std::optional<TimePoint> YakoRtuDrive::fresh_proof() const {
 }
 
 std::vector<ContinuityMark> YakoRtuDrive::marks_until(const MotionBlock& block) const {
-  std::vector<ContinuityMark> marks(canary_.blocks().begin(), canary_.blocks().end());
-  marks.push_back(distinct(block));
+  std::vector<ContinuityMark> marks;
+  for (const auto& present : canary_.blocks()) marks.push_back(mark_of(present));
+  marks.push_back(mark_of(distinct(block)));
   return marks;
 }
 

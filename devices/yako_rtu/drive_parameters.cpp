@@ -115,11 +115,13 @@ Task<Result<DriveSegments>> YakoRtuDrive::read_segments() {
   std::vector<std::uint16_t> addresses{reg::terminal_move_mode};
   for (const auto first : {reg::segment_pulses_high, reg::segment_pulses_low, reg::segment_speed,
                            reg::segment_time, reg::segment_pv_speed})
-    for (std::uint16_t i = 0; i < 16; ++i) addresses.push_back(static_cast<std::uint16_t>(first + i));
+    for (std::uint16_t i = 0; i < reg::segment_rows; ++i)
+      addresses.push_back(static_cast<std::uint16_t>(first + i));
   const auto registers = co_await read_registers(std::move(addresses), reading_of_client());
   if (!registers) co_return fail(registers.error());
   DriveSegments segments{.absolute = registers->at(reg::terminal_move_mode) == 1};
-  for (std::uint16_t i = 0; i < 16; ++i) {
+  segments.rows.resize(reg::segment_rows);
+  for (std::uint16_t i = 0; i < reg::segment_rows; ++i) {
     const auto at = [&](std::uint16_t first) { return registers->at(static_cast<std::uint16_t>(first + i)); };
     segments.rows.at(i) = {
         .pulses = static_cast<std::int32_t>(std::uint32_t{at(reg::segment_pulses_high)} << 16U |

@@ -26,6 +26,7 @@ inline constexpr std::uint16_t input_levels = 0x0040, first_input_function = 0x0
 inline constexpr std::uint16_t segment_pulses_high = 0x0090, segment_pulses_low = 0x00A0,
                                segment_speed = 0x00B0, segment_time = 0x00C0, segment_pv_speed = 0x00E0,
                                performance = 0x0110, last = 0x0119;
+inline constexpr std::uint16_t segment_rows = 16;
 // SSD2608PR and ESS42-R.
 inline constexpr std::uint16_t signal_polarity = 0x0010, loop_mode = 0x0012, encoder_resolution = 0x0110,
                                deviation_threshold = 0x0116, positioning_accuracy = 0x011F;

@@ -7,6 +7,7 @@
 
 #include "devices/descriptor.hpp"
 #include "devices/released_position.hpp"
+#include "devices/yako_rtu/codec.hpp"
 #include "devices/yako_rtu/registers.hpp"
 
 namespace axisd::yako_rtu {
@@ -39,6 +40,15 @@ inline constexpr TerminalFunctionSpec input_functions[] = {
     {"pin3", 19, {}},
     {"pin4", 20, {}},
 };
+
+/// What identifies all models of the family alike (6.1); exception 01 means a damaged frame (6.2.4).
+constexpr RtuIdentification identified(RtuIdentification model) {
+  model.read = {.address = reg::model, .count = 2};
+  model.version = &version_text;
+  model.damaged_frame = 1;
+  model.microstep_register = reg::microstep;
+  return model;
+}
 
 /// 0x0011 of the closed-loop models, in the order of the codes.
 inline constexpr std::array<std::int32_t, 16> closed_loop_microsteps = {

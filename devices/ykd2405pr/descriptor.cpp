@@ -113,7 +113,7 @@ std::span<const DriveDescriptor> descriptors() {
                        .position_source = PositionSource::commanded,
                        .closed_loop = false,
                        .communication_watchdog = false},
-      .identification = {.model_codes = model_codes, .microstep_codes = microsteps},
+      .identification = yako_rtu::identified({.model_codes = model_codes, .microstep_codes = microsteps}),
       .rtu_transactions = yako_rtu::transactions,
       .make = &make,
   }};

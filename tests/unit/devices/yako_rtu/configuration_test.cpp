@@ -123,7 +123,7 @@ TEST(Configuration, TheOtherReadingOfTheTerminalRegisters) {
 
 TEST(Configuration, SegmentsAreOwnedWholeButForTimesThatCannotBeWrittenBack) {
   auto set = setup();
-  DriveSegments table{.absolute = true};
+  DriveSegments table{.absolute = true, .rows = std::vector<DriveSegments::Row>(5)};
   table.rows[2] = {
       .pulses = -100'000, .velocity_rpm = 300, .acceleration_time = std::chrono::milliseconds(50)};
   table.rows[4] = {.acceleration_time = std::chrono::milliseconds(80), .pv_velocity_rpm = 60};
