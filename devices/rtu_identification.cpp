@@ -1,7 +1,6 @@
 #include "devices/rtu_identification.hpp"
 
 #include <algorithm>
-#include <functional>
 #include <optional>
 
 namespace axisd {
@@ -19,9 +18,10 @@ std::vector<RtuRead> distinct_reads() {
     if (model->bus == BusKind::modbus_rtu && std::ranges::find(reads, read) == reads.end())
       reads.push_back(read);
   }
-  std::ranges::stable_sort(reads, std::greater{}, [](RtuRead read) {
+  const auto most = std::ranges::max_element(reads, {}, [](RtuRead read) {
     return std::ranges::count_if(drive_models(), [&](const auto* one) { return is_shown_by(*one, read); });
   });
+  if (most != reads.end()) std::rotate(reads.begin(), most, most + 1);
   return reads;
 }
 
