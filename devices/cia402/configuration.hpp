@@ -1,25 +1,21 @@
 // Which objects' contents a DriveSetup means, in the order in which they are written (M3). Pure.
 #pragma once
 
-#include <optional>
-#include <span>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "buses/error.hpp"
 #include "devices/cia402/encoding.hpp"
 #include "devices/cia402/model.hpp"
-#include "devices/cia402/object_setting.hpp"
 #include "devices/drive.hpp"
+#include "devices/drive_settings.hpp"
 
 namespace axisd::cia402 {
 
-/// Everything but the EEPROM switch, whose state follows `persist` and which the driver sets before each of
-/// these, and the homing method, whose code is negotiated (6098h). Inputs that the setup does not name are
-/// set to "none": a function left in the EEPROM (JOG, start) could move the axis behind its owner's back.
-/// Outputs that it does not name are left alone. Errors: misconfigured (the model has no such terminal,
-/// function or microstep).
-Result<std::vector<ObjectSetting>> required_objects(const Model& model, const DriveSetup& setup);
+/// Everything but the EEPROM switch, whose state follows `persist`, and the homing method, whose code is
+/// negotiated (6098h). Errors: as of required_settings().
+Result<std::vector<DriveSetting>> required_objects(const Model& model, const DriveSetup& setup);
 
 /// The setting of a model whose manual leaves open what its terminal states show, and its choices.
 inline constexpr std::string_view terminal_states_key = "terminal_states";
@@ -29,13 +25,12 @@ inline constexpr std::string_view terminal_states[] = {"active", "level"};
 /// taken as it is shown.
 ActiveLow active_low(const Model& model, const DriveSetup& setup);
 
-/// What a setup means in objects.
-struct SetupObjects {
-  SetupObjects(const Model& model, const DriveSetup& setup);
+/// The setup of a drive, and what is made of it once.
+struct ObjectSetup : DriveSetup {
+  ObjectSetup(const Model& model, DriveSetup setup)
+      : DriveSetup(std::move(setup)), active_low(cia402::active_low(model, *this)) {}
 
-  std::vector<ObjectSetting> required;  ///< empty if it cannot be had
   ActiveLow active_low;
-  std::optional<Error> error;  ///< why the drive cannot be configured
 };
 
 }  // namespace axisd::cia402

@@ -22,7 +22,6 @@
 #include "devices/cia402/motion_watch.hpp"
 #include "devices/cia402/node_contact.hpp"
 #include "devices/cia402/object_canary.hpp"
-#include "devices/cia402/object_setting.hpp"
 #include "devices/cia402/objects.hpp"
 #include "devices/cia402/seen_objects.hpp"
 #include "devices/cia402/start_pdo.hpp"
@@ -32,6 +31,7 @@
 #include "devices/cia402/unit_objects.hpp"
 #include "devices/descriptor.hpp"
 #include "devices/drive.hpp"
+#include "devices/drive_configuration.hpp"
 
 namespace axisd::cia402 {
 
@@ -111,6 +111,7 @@ class Cia402Drive final : public Drive {
   using SdoOptions = canopen::SdoOptions;
   class Prepared;
   class Loaded;
+  class Memory;
   struct Trigger {
     Object object;
     std::int64_t value = 0;
@@ -286,26 +287,8 @@ class Cia402Drive final : public Drive {
 
   // drive_configuration.cpp
   Task<Result<Values>> read_values(std::vector<std::uint32_t> addresses, SdoOptions options);
-  /// Writes what differs, each part saved or not as it says, and verifies all of it.
-  Task<Result<void>> bring_to(std::vector<ObjectSetting> required);
-  Task<Result<void>> write_all(const std::vector<ObjectSetting>& required, Values& present);
-  Task<Result<void>> neutralise_inputs(const std::vector<ObjectSetting>& required, Values& present);
-  Task<Result<void>> prepare_write(const ObjectSetting& setting);
-  Task<Result<void>> check_inactive(const ObjectSetting& setting);
-  Task<Result<void>> verify(const std::vector<ObjectSetting>& required);
-  /// Writes one object of the configuration and counts it if it goes to the EEPROM.
-  Task<Result<void>> write_counted(std::uint32_t address, std::int64_t value, std::uint8_t bytes);
-  /// A write to it goes to the EEPROM while the drive saves.
-  [[nodiscard]] bool can_be_saved(std::uint32_t address) const;
-  /// And the drive saves now, as far as is known.
-  [[nodiscard]] bool is_saved(std::uint32_t address) const;
-  /// It was written: counted if it went to the EEPROM.
-  void count_write(std::uint32_t address);
-  /// Sets the EEPROM switch (200Ch of the YSS-C), if it is not so already.
-  /// `then`: saves that it is turned on for; they are permitted together, as turned in vain it only wears.
-  Task<Result<void>> save_writes(bool saved, std::uint64_t then = 0);
-  [[nodiscard]] bool saves_at_rest() const;
-  [[nodiscard]] Error not_held(const ObjectSetting& setting, std::int64_t actual) const;
+  [[nodiscard]] std::unique_ptr<DriveMemory> make_memory();
+  [[nodiscard]] MemoryTraits memory_traits() const;
 
   // drive_parameters.cpp
   /// Nothing in the drive's memory that a terminal or a power-up could turn into a motion.
@@ -319,8 +302,8 @@ class Cia402Drive final : public Drive {
   Clock* clock_;
   canopen::CanopenBus* bus_;
   canopen::RemoteNode node_;
-  DriveSetup setup_;
-  SetupObjects setup_objects_;
+  ObjectSetup setup_;
+  DriveConfiguration configuration_;
   SeenObjects seen_;
 
   // The way to the drive.

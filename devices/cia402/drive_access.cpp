@@ -42,6 +42,7 @@ void Cia402Drive::forget_power_cycle() {
   words_.forget();
   forget_pdos();  // they are what a power-up left of them
   words_.forget_halt();
+  configuration_.forget_power_cycle();
   seen_.forget_power_cycle();
   homing_.forget();
   motion_.forget();

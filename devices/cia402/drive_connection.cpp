@@ -65,8 +65,8 @@ Cia402Drive::Cia402Drive(const Model& model, DriveContext context)
       clock_(context.clock),
       bus_(context.canopen),
       node_(context.canopen->master().node(context.node)),
-      setup_(std::move(context.setup)),
-      setup_objects_(model, setup_),
+      setup_(model, std::move(context.setup)),
+      configuration_(make_memory(), memory_traits(), required_objects(model, setup_)),
       news_(context.executor, *context.clock),
       state_link_(*bus_, news_),
       words_(model.neutral_mode),
@@ -75,7 +75,7 @@ Cia402Drive::Cia402Drive(const Model& model, DriveContext context)
       node_.id(), {.on_event = [this](const canopen::NodeEvent& event) { on_event(event); },
                    .on_emergency = [this](const canopen::Emergency& one) { on_emergency(one); },
                    .on_foreign_command = [this](const std::string& what) { on_foreign_command(what); }});
-  if (!attached) setup_objects_.error = attached.error();
+  if (!attached) configuration_.refuse(attached.error());
 }
 
 Cia402Drive::~Cia402Drive() { bus_->detach(node_.id()); }
@@ -157,7 +157,7 @@ int Cia402Drive::velocity_noise() const {
 }
 
 Task<Result<void>> Cia402Drive::configure() {
-  if (setup_objects_.error) co_return failed(*setup_objects_.error);
+  if (configuration_.error()) co_return failed(*configuration_.error());
   // Before anything else: an EMCY with the identifier 80h would be a SYNC to the others (M24).
   if (const auto set = co_await set_emergency_id(); !set) co_return set;
   // The canary goes first and is read last: a restart in between would undo what was found or written.
@@ -188,14 +188,14 @@ Task<Result<void>> Cia402Drive::configure() {
         !found && found.error().reason == Reason::refused;  // some list it, and do not have it
     if (!found && !missing) co_return fail(found.error());
   }
-  if (const auto done = co_await bring_to(setup_objects_.required); !done) co_return done;
+  if (const auto done = co_await configuration_.apply(); !done) co_return done;
   if (const auto halting =
           co_await write_object(object::halt_option, model_->meaning.halt_on_ramp, 0, patiently());
       halting)
     words_.set_halt_option(model_->meaning.halt_on_ramp);
   // Saved only where everything is: what is in the EEPROM is not written again after the next power-up, and
   // to switch saving off for it would itself be a write to the EEPROM at each start.
-  auto switched = co_await save_writes(saves_at_rest());
+  auto switched = co_await configuration_.leave_switch();
   if (switched) switched = co_await set_heartbeat();
   if (switched) switched = co_await disarm(patiently());
   if (switched) switched = co_await set_pdos();
@@ -270,7 +270,7 @@ Task<Result<void>> Cia402Drive::set_heartbeat() {
   const auto wanted = static_cast<std::uint64_t>(heartbeat_period / milliseconds(1));
   if (**present == 0 || **present > wanted)
     if (const auto written =
-            co_await write_counted(object::heartbeat_time.key(), static_cast<std::int64_t>(wanted), 2);
+            co_await configuration_.write(object::heartbeat_time.key(), {static_cast<std::int64_t>(wanted)});
         !written)
       co_return written;
   bus_->watch_heartbeat(node_.id(), heartbeat_patience);
@@ -304,12 +304,14 @@ Task<canopen::PdoOutcome> Cia402Drive::set_pdo(canopen::PdoSettings wanted) {
   constexpr std::uint8_t most_subs = 8;
   bool saved = false;
   for (std::uint8_t sub = 0; sub <= most_subs; ++sub)
-    saved = saved || is_saved(canopen::communication_object(wanted.direction, wanted.number, sub).key()) ||
-            is_saved(canopen::mapping_object(wanted.direction, wanted.number, sub).key());
+    for (const auto object : {canopen::communication_object(wanted.direction, wanted.number, sub),
+                              canopen::mapping_object(wanted.direction, wanted.number, sub)})
+      saved = saved || configuration_.is_saved(object.key());
   std::function<Result<void>(std::uint64_t)> permit;
   if (saved) permit = [this](std::uint64_t writes) { return permit_saves(writes); };
   auto outcome = co_await canopen::configure_pdo(node_, std::move(wanted), patiently(), std::move(permit));
-  for (const auto object : outcome.written) count_write(object.key());
+  for (const auto object : outcome.written)
+    if (configuration_.is_saved(object.key())) count_save(1);
   co_return outcome;
 }
 

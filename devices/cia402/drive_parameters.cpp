@@ -48,8 +48,7 @@ constexpr Owner motion_owners[] = {{object::control_word, "AxisService.Enable"},
 }  // namespace
 
 std::string Cia402Drive::configured_by(std::uint32_t address) const {
-  const auto required = std::ranges::find(setup_objects_.required, address, &ObjectSetting::address);
-  if (required != setup_objects_.required.end()) return required->key;
+  if (auto key = configuration_.key_of(address); !key.empty()) return key;
   const auto* parameter = find_parameter(model_->descriptor->parameters, address);
   if (parameter == nullptr || !is_writable(*parameter)) return {};
   if (address < first_own_object) return "the CANopen master";
@@ -87,12 +86,12 @@ Task<Result<std::vector<ParameterValue>>> Cia402Drive::write_parameters(std::vec
     if (!before) co_return fail(before.error());
     if (*before != value.value) different.push_back(value);
   }
-  const auto saves = static_cast<std::uint64_t>(
-      std::ranges::count_if(different, [&](const auto& value) { return is_saved(value.address); }));
+  const auto saves = static_cast<std::uint64_t>(std::ranges::count_if(
+      different, [&](const auto& value) { return configuration_.is_saved(value.address); }));
   if (saves > 0)  // all of them or none
     if (const auto permitted = permit_saves(saves); !permitted) co_return fail(permitted.error());
   for (const auto& value : different) {
-    const auto written = co_await write_counted(value.address, value.value, 0);
+    const auto written = co_await configuration_.write(value.address, {value.value});
     if (!written) co_return fail(written.error());
   }
   std::vector<ParameterValue> present;
@@ -195,9 +194,7 @@ Task<Result<std::string>> Cia402Drive::restore_factory(std::vector<std::uint8_t>
   if (!model_->objects.restore)
     co_return fail(not_supported("the drive cannot restore its factory settings", "use its maker's tool"));
   // The drive stays out of use until it is configured again, and what is kept there is saved once more.
-  const auto kept =
-      static_cast<std::uint64_t>(std::ranges::count_if(setup_objects_.required, &ObjectSetting::saved));
-  const auto saves = 1 + (kept == 0 ? 0 : kept + 2);  // two turn the switch, there and back
+  const auto saves = 1 + configuration_.saves_of_setup();
   if (const auto permitted = permit_saves(saves); !permitted) co_return fail(permitted.error());
   auto address = co_await factory_address(taken);
   if (!address) co_return address;
@@ -255,9 +252,9 @@ Task<Result<std::string>> Cia402Drive::change_serial(SerialChange change) {
   // All of it or nothing: half of it might leave the drive out of reach. Two turn the switch, there and back.
   if (const auto permitted = permit_saves(values->size() + 2); !permitted) co_return fail(permitted.error());
   // Without `persist` the drive was told not to save: such a change would be gone when it counts.
-  if (const auto saving = co_await save_writes(true); !saving) co_return fail(saving.error());
+  if (const auto saving = co_await configuration_.save_writes(true); !saving) co_return fail(saving.error());
   const auto written = co_await write_parameters(std::move(*values));
-  const auto restored = co_await save_writes(saves_at_rest());
+  const auto restored = co_await configuration_.leave_switch();
   if (!written) co_return fail(written.error());
   if (!restored) co_return fail(restored.error());
   std::string text = "it counts from the next power-up";

@@ -76,7 +76,8 @@ Task<Result<void>> Cia402Drive::disarm(SdoOptions options) {
     if (!written) break;
     // Counted, but not asked for: what is armed may move at the next SYNC.
     written = co_await write_object(object, canopen::event_driven_of_profile, 1, options);
-    if (written || written.error().outcome == Outcome::unknown) count_write(object.key());
+    const bool executed = written || written.error().outcome == Outcome::unknown;
+    if (executed && configuration_.is_saved(object.key())) count_save(1);
   }
   // Whatever came of it: its state comes by PDO.
   const auto started = co_await enter_operational();

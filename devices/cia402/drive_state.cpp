@@ -175,7 +175,7 @@ bool Cia402Drive::known_by_way() const {
 
 DriveSample Cia402Drive::decoded(const Values& values) const {
   const auto noise = position_window() > 0 ? velocity_noise() : 0;  // else its velocities are exact, too
-  return decode_state(*model_, setup_.pulses_per_revolution, values, setup_objects_.active_low, noise);
+  return decode_state(*model_, setup_.pulses_per_revolution, values, setup_.active_low, noise);
 }
 
 /// `of_one_moment`: all of the reading's positions are.

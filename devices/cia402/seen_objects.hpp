@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <map>
 #include <optional>
-#include <set>
 
 #include "buses/canopen/object.hpp"
 #include "buses/clock.hpp"
@@ -20,17 +19,13 @@ struct SeenObjects {
   /// VendorObjects::position_window and velocity_threshold, as they were read last.
   std::optional<std::int64_t> position_window, velocity_threshold;
   // Of this power cycle.
-  std::optional<bool> closed_loop;   ///< the loop mode, before the first write
-  std::optional<bool> saving;        ///< the EEPROM switch; nothing: unknown
-  std::set<std::uint32_t> not_held;  ///< saved objects that did not hold what was written
+  std::optional<bool> closed_loop;  ///< the loop mode, before the first write
   /// 6085h, as it was read last; nothing: a quick stop brakes as a stop, as far as is known.
   std::optional<std::int64_t> quick_stop_ramp;
   bool halts_on_ramp_alone = false;  ///< it refused another 605Dh
 
   void forget_power_cycle() {
     closed_loop.reset();
-    saving.reset();
-    not_held.clear();
     quick_stop_ramp.reset();
     halts_on_ramp_alone = false;
   }

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "devices/setup_codes.hpp"
 #include "devices/yako_rtu/codec.hpp"
@@ -12,53 +13,23 @@ namespace axisd::yako_rtu {
 
 namespace {
 
-void add_inputs(const TerminalAssignment& inputs, std::span<const TerminalSpec> terminals,
-                std::uint16_t first, bool limits_and_stops, bool saved, std::vector<RegisterSetting>& all) {
-  for (std::size_t i = 0; i < inputs.functions.size(); ++i) {
-    const auto* function = inputs.functions[i];
-    if (is_limit_or_stop(function) != limits_and_stops) continue;
-    all.push_back({.address = static_cast<std::uint16_t>(first + i),
-                   .value = function == nullptr ? std::uint16_t{0} : function->code,
-                   .key = fmt::format("inputs.{}", terminals[i].name),
-                   .saved = saved,
-                   .starts_motion = function != nullptr && function->starts_motion,
-                   .input_bits = 1U << i});
-  }
-}
+constexpr std::int64_t word = 0xFFFF;
+constexpr std::uint32_t segment_rows = 16;
 
-void add_outputs(const TerminalAssignment& outputs, std::span<const TerminalSpec> terminals, bool saved,
-                 std::vector<RegisterSetting>& all) {
-  for (std::size_t i = 0; i < outputs.functions.size(); ++i)
-    if (const auto* function = outputs.functions[i])
-      all.push_back({.address = static_cast<std::uint16_t>(reg::first_output_function + i),
-                     .value = function->code,
-                     .key = fmt::format("outputs.{}", terminals[i].name),
-                     .saved = saved});
-}
-
-/// Settings that the model's descriptor ties to a register: a choice's index, a number, or 0 and 1.
-void add_settings(const DriveDescriptor& model, const DriveSetup& setup, std::vector<RegisterSetting>& all) {
-  for (const auto& spec : model.settings) {
-    const auto found = setup.model_settings.find(std::string(spec.key));
-    if (found == setup.model_settings.end()) continue;
-    const auto code = code_of(spec, found->second);
-    if (code)
-      all.push_back({.address = static_cast<std::uint16_t>(*spec.object),
-                     .value = static_cast<std::uint16_t>(*code),
-                     .key = fmt::format("drive.{}", spec.key),
-                     .saved = setup.persist.drive});
-  }
-}
-
-void add_homing(const DriveSetup& setup, std::vector<RegisterSetting>& all) {
+std::vector<DriveSetting> homing_registers(const HomingProfile& homing) {
   static constexpr std::string_view keys[] = {"method", "velocity", "search_velocity", "acceleration_time",
                                               "offset", "offset"};
-  const auto block = encode(*setup.homing);
-  for (std::size_t i = 0; i < block.size(); ++i)
-    all.push_back({.address = static_cast<std::uint16_t>(reg::homing_mode + i),
-                   .value = block.at(i),
-                   .key = fmt::format("homing.{}", keys[i]),
-                   .saved = setup.persist.homing});
+  const auto block = encode(homing);
+  std::vector<DriveSetting> all;
+  for (std::uint32_t i = 0; i < block.size(); ++i)
+    all.push_back(
+        {.address = reg::homing_mode + i, .value = block.at(i), .key = fmt::format("homing.{}", keys[i])});
+  return all;
+}
+
+/// Homing's block is compared before each homing, the performance group moves nothing.
+bool is_watched(std::uint32_t address) {
+  return address < reg::homing_start || (address >= reg::input_levels && address < reg::performance);
 }
 
 }  // namespace
@@ -79,73 +50,76 @@ std::uint32_t segment_enables(const Model& model, const DriveSetup& setup) {
   return bits;
 }
 
-std::vector<RegisterSetting> segment_registers(const DriveSegments& segments, std::uint32_t enables) {
-  std::vector<RegisterSetting> all{{.address = reg::terminal_move_mode,
-                                    .value = static_cast<std::uint16_t>(segments.absolute ? 1 : 0),
-                                    .key = "segments.mode",
-                                    .starts_motion = true,
-                                    .input_bits = enables}};
-  const auto add = [&](std::uint16_t first, std::size_t row, std::int64_t value) {
-    all.push_back({.address = static_cast<std::uint16_t>(first + row),
-                   .value = static_cast<std::uint16_t>(value & 0xFFFF),
-                   .key = "segments",
+std::vector<DriveSetting> segment_registers(const DriveSegments& segments, std::uint32_t enables,
+                                            bool saved) {
+  std::vector<DriveSetting> all;
+  const auto add = [&](std::uint32_t address, std::int64_t value, const char* key) {
+    all.push_back({.address = address,
+                   .value = value & word,
+                   .key = key,
+                   .saved = saved,
                    .starts_motion = true,
                    .input_bits = enables});
   };
+  const auto add_row = [&](std::uint32_t first, std::size_t row, std::int64_t value) {
+    add(first + static_cast<std::uint32_t>(row), value, "segments");
+  };
+  add(reg::terminal_move_mode, segments.absolute ? 1 : 0, "segments.mode");
   // Also those that the inputs cannot select.
   auto rows = segments.rows;
   rows.resize(reg::segment_rows);
-  for (std::size_t i = 0; i < rows.size(); ++i) add(reg::segment_pulses_high, i, rows.at(i).pulses >> 16);
-  for (std::size_t i = 0; i < rows.size(); ++i) add(reg::segment_pulses_low, i, rows.at(i).pulses);
+  for (std::size_t i = 0; i < rows.size(); ++i) add_row(reg::segment_pulses_high, i, rows.at(i).pulses >> 16);
+  for (std::size_t i = 0; i < rows.size(); ++i) add_row(reg::segment_pulses_low, i, rows.at(i).pulses);
   for (std::size_t i = 0; i < rows.size(); ++i)
     // Printed 30..2000 with the default 0, which cannot be written back: rows without motion keep theirs.
     if (rows.at(i).velocity_rpm != 0 || rows.at(i).pv_velocity_rpm != 0)
-      add(reg::segment_time, i, rows.at(i).acceleration_time / std::chrono::milliseconds(1));
+      add_row(reg::segment_time, i, rows.at(i).acceleration_time / std::chrono::milliseconds(1));
   // Last, so that a row can be started only when all of it is there.
-  for (std::size_t i = 0; i < rows.size(); ++i) add(reg::segment_speed, i, rows.at(i).velocity_rpm);
-  for (std::size_t i = 0; i < rows.size(); ++i) add(reg::segment_pv_speed, i, rows.at(i).pv_velocity_rpm);
+  for (std::size_t i = 0; i < rows.size(); ++i) add_row(reg::segment_speed, i, rows.at(i).velocity_rpm);
+  for (std::size_t i = 0; i < rows.size(); ++i) add_row(reg::segment_pv_speed, i, rows.at(i).pv_velocity_rpm);
   return all;
 }
 
-Result<std::vector<RegisterSetting>> required_registers(const Model& model, const DriveSetup& setup) {
-  const auto& descriptor = *model.descriptor;
-  const auto inputs = assign_terminals(setup.inputs, descriptor.inputs, descriptor.input_functions);
-  if (!inputs) return fail(inputs.error());
-  const auto outputs = assign_terminals(setup.outputs, descriptor.outputs, descriptor.output_functions);
-  if (!outputs) return fail(outputs.error());
-  const auto codes = descriptor.identification.microstep_codes;
-  const auto microstep = std::ranges::find(codes, setup.pulses_per_revolution);
-  if (microstep == codes.end())
-    return fail(Reason::misconfigured, fmt::format("the drive has no microstep setting of {} pulses/rev",
-                                                   setup.pulses_per_revolution));
-
-  const auto first = first_input_function(model, setup);
-  const bool terminals_saved = setup.persist.terminals;
-  std::vector<RegisterSetting> all;
-  all.push_back({.address = reg::input_levels,
-                 .value = static_cast<std::uint16_t>(inputs->levels),
-                 .key = "inputs",
-                 .saved = terminals_saved});
-  if (!setup.outputs.empty())
-    all.push_back({.address = reg::output_levels,
-                   .value = static_cast<std::uint16_t>(outputs->levels),
-                   .key = "outputs",
-                   .mask = static_cast<std::uint16_t>(outputs->named),
-                   .saved = terminals_saved});
-  add_inputs(*inputs, descriptor.inputs, first, true, terminals_saved, all);
-  all.push_back({.address = reg::microstep,
-                 .value = static_cast<std::uint16_t>(microstep - codes.begin()),
-                 .key = "scale.microstep",
-                 .saved = setup.persist.drive});
-  add_settings(descriptor, setup, all);
-  if (setup.homing) add_homing(setup, all);
-  add_outputs(*outputs, descriptor.outputs, terminals_saved, all);
-  add_inputs(*inputs, descriptor.inputs, first, false, terminals_saved, all);
-  if (setup.segments) {
-    for (auto& row : segment_registers(*setup.segments, segment_enables(model, setup))) {
-      row.saved = setup.persist.segments;
-      all.push_back(std::move(row));
+std::vector<DriveSetting> silenced_segments(std::span<const DriveSetting> required,
+                                            const SettingValues& present, std::uint32_t enables, bool saved) {
+  const auto differs = [&](std::uint32_t address) {
+    const auto found = std::ranges::find(required, address, &DriveSetting::address);
+    return found != required.end() && !found->holds(present.at(address));
+  };
+  std::vector<DriveSetting> silenced;
+  for (std::uint32_t row = 0; row < segment_rows; ++row) {
+    const bool changes = differs(reg::terminal_move_mode) || differs(reg::segment_pulses_high + row) ||
+                         differs(reg::segment_pulses_low + row) || differs(reg::segment_time + row);
+    for (const auto speed : {reg::segment_speed + row, reg::segment_pv_speed + row}) {
+      const auto held = present.find(speed);
+      if (!changes || held == present.end() || held->second == 0) continue;
+      silenced.push_back({.address = speed,
+                          .key = "segments",
+                          .saved = saved,
+                          .starts_motion = true,
+                          .input_bits = enables});
     }
+  }
+  return silenced;
+}
+
+Result<std::vector<DriveSetting>> required_registers(const Model& model, const DriveSetup& setup) {
+  const auto places = SettingPlaces{.input_levels = reg::input_levels,
+                                    .first_input_function = first_input_function(model, setup),
+                                    .output_levels = reg::output_levels,
+                                    .first_output_function = reg::first_output_function,
+                                    .microstep = reg::microstep,
+                                    .microstep_codes = model.descriptor->identification.microstep_codes};
+  auto all = required_settings(*model.descriptor, setup, places,
+                               setup.homing ? homing_registers(*setup.homing) : std::vector<DriveSetting>());
+  if (!all) return all;
+  if (setup.segments)
+    for (auto& row :
+         segment_registers(*setup.segments, segment_enables(model, setup), setup.persist.segments))
+      all->push_back(std::move(row));
+  for (auto& setting : *all) {
+    setting.value &= word;
+    setting.watched = is_watched(setting.address);
   }
   return all;
 }

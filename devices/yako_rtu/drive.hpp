@@ -4,7 +4,6 @@
 #include <map>
 #include <memory>
 #include <optional>
-#include <set>
 #include <span>
 #include <string>
 #include <vector>
@@ -13,6 +12,7 @@
 #include "devices/canary.hpp"
 #include "devices/descriptor.hpp"
 #include "devices/drive_access.hpp"
+#include "devices/drive_configuration.hpp"
 #include "devices/yako_rtu/codec.hpp"
 #include "devices/yako_rtu/configuration.hpp"
 #include "devices/yako_rtu/mode_watch.hpp"
@@ -36,10 +36,12 @@ class YakoRtuDrive final : public Drive {
   using Drive::read_state;
   Task<Result<DriveSample>> read_state(TransactionClass transaction_class, TimePoint awaited_from) override;
   Task<Result<std::optional<DriveSample>>> watch_state(StateWatch watch) override;
-  Task<Result<Drift>> check_drift(TransactionOptions options) override;
   [[nodiscard]] bool moves_by_itself() const override;
   [[nodiscard]] bool closed_loop() const override;
   [[nodiscard]] std::int64_t position_window() const override;
+
+  // drive_configuration.cpp
+  Task<Result<Drift>> check_drift(TransactionOptions options) override;
 
   // drive_motion.cpp
   Task<Result<void>> check_continuity(TransactionClass transaction_class) override;
@@ -90,6 +92,7 @@ class YakoRtuDrive final : public Drive {
     std::uint16_t value;
   };
   class Loaded;
+  class Memory;
 
   // drive_connection.cpp
   /// One reading of the state, in the order of the readings.
@@ -107,21 +110,10 @@ class YakoRtuDrive final : public Drive {
   /// Reads what `settings` speak of, in blocks.
   Task<Result<Registers>> read_registers(std::vector<std::uint16_t> addresses,
                                          TransactionOptions options) const;
-  /// Writes what differs, each part saved or not as it says, and verifies it.
-  Task<Result<void>> bring_to(std::vector<RegisterSetting> required);
-  Task<Result<void>> write_all(const std::vector<RegisterSetting>& required, Registers& present);
-  Task<Result<void>> write_differences(const std::vector<RegisterSetting>& required, Registers& present);
-  Task<Result<void>> verify(const std::vector<RegisterSetting>& required);
-  Task<Result<void>> silence_segments(const std::vector<RegisterSetting>& required, Registers& present);
-  Task<Result<void>> neutralise_inputs(const std::vector<RegisterSetting>& required, Registers& present);
-  Task<Result<void>> prepare_write(const RegisterSetting& setting);
-  Task<Result<void>> check_inactive(const RegisterSetting& setting) const;
-  Task<Result<void>> write_run(std::uint16_t address, std::vector<std::uint16_t> values);
-  [[nodiscard]] std::uint64_t saved_registers(std::uint16_t first, std::size_t count) const;
-  /// Sets the EEPROM switch (0x0016), if it is not so already.
-  /// `then`: saves that it is turned on for; they are permitted together, as turned in vain it only wears.
-  Task<Result<void>> save_writes(bool saved, std::uint64_t then = 0);
-  [[nodiscard]] bool saves_at_rest() const;
+
+  // drive_configuration.cpp
+  [[nodiscard]] std::unique_ptr<DriveMemory> make_memory();
+  [[nodiscard]] MemoryTraits memory_traits() const;
 
   // drive_motion.cpp
   [[nodiscard]] std::vector<ContinuityMark> marks_until(const MotionBlock& block) const;
@@ -156,7 +148,6 @@ class YakoRtuDrive final : public Drive {
   [[nodiscard]] std::unexpected<Error> failed(Error error) const;
   /// `found`: in place of the canary.
   [[nodiscard]] Error lost_memory(const MotionBlock& found) const;
-  [[nodiscard]] Error not_held(const RegisterSetting& setting, std::uint16_t actual) const;
   [[nodiscard]] Error error_at(Reason reason, std::uint16_t address, std::string message,
                                std::string remedy) const;
 
@@ -165,21 +156,18 @@ class YakoRtuDrive final : public Drive {
   modbus_rtu::Node node_;
   DriveSetup setup_;
   std::uint16_t first_input_function_;
-  std::vector<RegisterSetting> required_;  ///< by the setup; empty if it cannot be had (configure() says why)
-  std::optional<Error> setup_error_;
+  DriveConfiguration configuration_;
   Canary<MotionBlock> canary_{factory_block};
   /// When the canary, or a reading of the state that no restarted drive shows, was asked for, if it was the
   /// last of both. Kept here, and not by the axis: every answer of the drive and every write that voids a
   /// proof passes through this class, and so does the trigger that rests on it.
   std::optional<TimePoint> proven_at_;
-  std::optional<bool> saving_;        ///< 0x0016, if it is known
   std::optional<bool> found_closed_;  ///< 0x0012 as it was before this power cycle's first write
   std::optional<std::uint16_t> terminal_move_mode_;  ///< 0x0026, if it is known
   ModeWatch mode_;
   TornPosition torn_position_;
   /// 0x011F and the counts of a revolution by 0x0110, as the factory sets them until they were read.
   std::int64_t accuracy_ = 10, counts_per_revolution_ = 4000;
-  std::set<std::uint16_t> unsaved_;  ///< saved registers that did not hold what was written
 };
 
 std::unique_ptr<Drive> make_drive(const Model& model, DriveContext context);

@@ -33,7 +33,7 @@ void YakoRtuDrive::forget_power_cycle(const MotionBlock& block) {
   canary_.note_power_up(block);
   torn_position_.forget();
   found_closed_.reset();
-  unsaved_.clear();
+  configuration_.forget_power_cycle();
 }
 
 Error YakoRtuDrive::lost_memory(const MotionBlock& found) const {
@@ -285,7 +285,7 @@ Task<Result<void>> YakoRtuDrive::prepare_homing(HomingBlock block, TransactionOp
   const auto present = co_await node_.read(reg::homing_mode, 6, options);
   if (!present) co_return failed(present.error());
   if (std::ranges::equal(present->registers, block)) co_return Result<void>{};
-  const bool saved = saving_.value_or(true);
+  const bool saved = configuration_.saves();
   if (saved)
     if (const auto permitted = permit_saves(1); !permitted) co_return permitted;
   const auto written = co_await node_.write_block(reg::homing_mode, block, std::move(options));

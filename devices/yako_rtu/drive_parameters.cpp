@@ -47,8 +47,7 @@ constexpr Owner motion_owners[] = {{reg::start_speed, "limits.start_speed"},
 }  // namespace
 
 std::string YakoRtuDrive::configured_by(std::uint32_t address) const {
-  const auto required = std::ranges::find(required_, address, &RegisterSetting::address);
-  if (required != required_.end()) return required->key;
+  if (auto key = configuration_.key_of(address); !key.empty()) return key;
   const auto owner = std::ranges::find(motion_owners, address, &Owner::address);
   return owner == std::end(motion_owners) ? std::string() : std::string(owner->key);
 }
@@ -87,14 +86,13 @@ Task<Result<std::vector<ParameterValue>>> YakoRtuDrive::write_parameters(std::ve
     return ((*before)[i].value & 0xFFFF) != (values[i].value & 0xFFFF);
   };
   std::uint64_t saves = 0;  // all of them or none
-  for (std::size_t i = 0; i < values.size() && saving_.value_or(true); ++i)
-    if (differs(i)) saves += saved_registers(static_cast<std::uint16_t>(values[i].address), 1);
+  for (std::size_t i = 0; i < values.size(); ++i)
+    if (differs(i) && configuration_.is_saved(values[i].address)) ++saves;
   if (saves > 0)
     if (const auto permitted = permit_saves(saves); !permitted) co_return fail(permitted.error());
   for (std::size_t i = 0; i < values.size(); ++i) {
     if (!differs(i)) continue;  // spares the EEPROM
-    std::vector<std::uint16_t> word{static_cast<std::uint16_t>(values[i].value & 0xFFFF)};
-    const auto written = co_await write_run(static_cast<std::uint16_t>(values[i].address), std::move(word));
+    const auto written = co_await configuration_.write(values[i].address, {values[i].value & 0xFFFF});
     if (!written) co_return fail(written.error());
   }
   auto present = co_await read_values(std::move(addresses), parameters());
@@ -134,9 +132,8 @@ Task<Result<DriveSegments>> YakoRtuDrive::read_segments() {
 }
 
 Task<Result<void>> YakoRtuDrive::write_segments(DriveSegments segments) {
-  auto required = segment_registers(segments, segment_enables(*model_, setup_));
-  for (auto& row : required) row.saved = setup_.persist.segments;
-  co_return co_await bring_to(std::move(required));
+  co_return co_await configuration_.bring_to(
+      segment_registers(segments, segment_enables(*model_, setup_), setup_.persist.segments));
 }
 
 Task<Result<void>> YakoRtuDrive::save_parameters() {
@@ -175,8 +172,7 @@ Task<Result<void>> YakoRtuDrive::save_parameters() {
 
 Task<Result<std::string>> YakoRtuDrive::restore_factory(std::vector<std::uint8_t> taken) {
   // The drive stays out of use until it is configured again, and what is kept there is saved once more.
-  const auto kept = static_cast<std::uint64_t>(std::ranges::count_if(required_, &RegisterSetting::saved));
-  const auto saves = 1 + (kept == 0 ? 0 : kept + 2);  // two turn the switch, there and back
+  const auto saves = 1 + configuration_.saves_of_setup();
   if (const auto permitted = permit_saves(saves); !permitted) co_return fail(permitted.error());
   const auto before = co_await read_registers({reg::node, reg::custom_node}, parameters());
   if (!before) co_return fail(before.error());
@@ -196,8 +192,7 @@ Task<Result<std::string>> YakoRtuDrive::restore_factory(std::vector<std::uint8_t
     canary_.forget();  // whatever stands there now, it is not ours
     proven_at_.reset();
     terminal_move_mode_.reset();
-    saving_.reset();
-    unsaved_.clear();
+    configuration_.forget_power_cycle();
   }
   if (!restored) co_return failed(restored.error());
   auto text = custom ? fmt::format("address {}", model_->factory_custom_node != 0
@@ -257,9 +252,9 @@ Task<Result<std::string>> YakoRtuDrive::change_serial(SerialChange change) {
   // All of it or nothing: half of it might leave the drive out of reach. Two turn the switch, there and back.
   if (const auto permitted = permit_saves(values->size() + 2); !permitted) co_return fail(permitted.error());
   // Without `persist` the drive was told not to save: such a change would be gone when it counts.
-  if (const auto saving = co_await save_writes(true); !saving) co_return fail(saving.error());
+  if (const auto saving = co_await configuration_.save_writes(true); !saving) co_return fail(saving.error());
   const auto written = co_await write_parameters(std::move(*values));
-  const auto restored = co_await save_writes(saves_at_rest());
+  const auto restored = co_await configuration_.leave_switch();
   if (!written) co_return fail(written.error());
   if (!restored) co_return fail(restored.error());
   co_return serial_advice(change);

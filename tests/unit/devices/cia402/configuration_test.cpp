@@ -34,19 +34,19 @@ DriveSetup setup() {
   return setup;
 }
 
-std::vector<ObjectSetting> required(const DriveSetup& setup) {
+std::vector<DriveSetting> required(const DriveSetup& setup) {
   auto all = required_objects(model(), setup);
   EXPECT_TRUE(all) << all.error().message;
-  return all ? *all : std::vector<ObjectSetting>();
+  return all ? *all : std::vector<DriveSetting>();
 }
 
-std::ptrdiff_t place(const std::vector<ObjectSetting>& all, Object object) {
-  return std::ranges::find(all, object.key(), &ObjectSetting::address) - all.begin();
+std::ptrdiff_t place(const std::vector<DriveSetting>& all, Object object) {
+  return std::ranges::find(all, object.key(), &DriveSetting::address) - all.begin();
 }
 
-const ObjectSetting& at(const std::vector<ObjectSetting>& all, Object object) {
-  static const ObjectSetting none{.key = "none"};
-  const auto found = std::ranges::find(all, object.key(), &ObjectSetting::address);
+const DriveSetting& at(const std::vector<DriveSetting>& all, Object object) {
+  static const DriveSetting none{.key = "none"};
+  const auto found = std::ranges::find(all, object.key(), &DriveSetting::address);
   EXPECT_NE(found, all.end()) << to_string(object);
   return found == all.end() ? none : *found;
 }
@@ -126,7 +126,7 @@ TEST(Cia402Configuration, WritesHomingInTheSizesOfTheDictionary) {
                                 .offset_pulses = -300};
   const auto all = required(homing);
   EXPECT_EQ(at(all, object::homing_speed).value, 200);
-  EXPECT_EQ(at(all, object::homing_speed).bytes, 4);
+  EXPECT_EQ(type_of(model(), object::homing_speed).bytes, 4);
   EXPECT_EQ(at(all, object::homing_search_speed).value, 20);
   EXPECT_EQ(at(all, object::homing_time).value, 150);
   EXPECT_EQ(at(all, object::homing_offset).value, -300) << "one signed object";

@@ -107,13 +107,10 @@ TEST(SeenObjects, TheLongestAnswerOfLateCounts) {
 }
 
 TEST(SeenObjects, APowerCycleLeavesWhatTheFirmwareIs) {
-  SeenObjects seen{
-      .other_homing_codes = true, .closed_loop = true, .saving = true, .not_held = {0x200C'0000}};
+  SeenObjects seen{.other_homing_codes = true, .closed_loop = true};
   seen.sizes[canopen::Object{0x6081, 0}.key()] = 2;
   seen.forget_power_cycle();
   EXPECT_FALSE(seen.closed_loop);
-  EXPECT_FALSE(seen.saving);
-  EXPECT_TRUE(seen.not_held.empty());
   EXPECT_TRUE(seen.other_homing_codes);
   EXPECT_EQ(seen.size({0x6081, 0}), 2);
   EXPECT_FALSE(seen.size({0x6083, 0}));

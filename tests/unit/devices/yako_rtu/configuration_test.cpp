@@ -18,8 +18,8 @@ Model model_of(const char* name, std::uint16_t first_input_function = reg::first
 }
 const Model ykd = model_of("ykd2405pr");
 
-std::ptrdiff_t place(const std::vector<RegisterSetting>& all, std::uint16_t address) {
-  return std::ranges::find(all, address, &RegisterSetting::address) - all.begin();
+std::ptrdiff_t place(const std::vector<DriveSetting>& all, std::uint16_t address) {
+  return std::ranges::find(all, address, &DriveSetting::address) - all.begin();
 }
 
 DriveSetup setup() {
@@ -145,6 +145,25 @@ TEST(Configuration, SegmentsAreOwnedWholeButForTimesThatCannotBeWrittenBack) {
   EXPECT_TRUE(at(0x00B0).starts_motion);
   EXPECT_EQ(at(0x00B0).input_bits, 1U << 9U);
   EXPECT_EQ(place(*all, 0x00C0), std::ssize(*all));
+}
+
+TEST(Configuration, ARowThatChangesIsSilencedFirst) {
+  DriveSegments table;
+  table.rows[2] = {.pulses = 1000, .velocity_rpm = 300, .acceleration_time = std::chrono::milliseconds(50)};
+  const auto wanted = segment_registers(table, 0b100, true);
+  SettingValues present;
+  for (const auto& setting : wanted) present[setting.address] = setting.value;
+  EXPECT_TRUE(silenced_segments(wanted, present, 0b100, true).empty()) << "nothing changes";
+  present[0x00A2] = 999;
+  const auto silenced = silenced_segments(wanted, present, 0b100, true);
+  ASSERT_EQ(silenced.size(), 1U) << "its PV speed is 0 as it is";
+  EXPECT_EQ(silenced[0].address, 0x00B2U);
+  EXPECT_EQ(silenced[0].value, 0);
+  EXPECT_EQ(silenced[0].input_bits, 0b100U);
+  EXPECT_TRUE(silenced[0].saved && silenced[0].starts_motion);
+  present[reg::terminal_move_mode] = 1;
+  present[0x00E4] = 60;
+  EXPECT_EQ(silenced_segments(wanted, present, 0b100, true).size(), 2U) << "another mode is for all rows";
 }
 
 TEST(Configuration, FunctionsThatCanStartMotion) {
