@@ -19,8 +19,7 @@
 #include "buses/signal.hpp"
 #include "buses/task.hpp"
 #include "devices/axis/activity.hpp"
-#include "devices/axis/axis_environment.hpp"
-#include "devices/axis/axis_face.hpp"
+#include "devices/axis/axis_context.hpp"
 #include "devices/axis/axis_life.hpp"
 #include "devices/axis/command_buffer.hpp"
 #include "devices/axis/continuity.hpp"
@@ -31,20 +30,13 @@
 #include "devices/axis/link_machine.hpp"
 #include "devices/axis/observed_times.hpp"
 #include "devices/axis/obstacles.hpp"
-#include "devices/axis/planner.hpp"
 #include "devices/axis/poll_pace.hpp"
-#include "devices/axis/position_tracker.hpp"
 #include "devices/axis/power_machine.hpp"
-#include "devices/axis/settings.hpp"
-#include "devices/axis/shaft_watch.hpp"
+#include "devices/axis/shaft.hpp"
 #include "devices/axis/speed_watch.hpp"
 #include "devices/axis/standstill.hpp"
 #include "devices/axis/stop_machine.hpp"
-#include "devices/axis/terminal_motion.hpp"
-#include "devices/axis/terminals.hpp"
 #include "devices/axis/unknown_outcomes.hpp"
-#include "devices/descriptor.hpp"
-#include "devices/drive.hpp"
 
 namespace axisd {
 
@@ -88,10 +80,10 @@ class Axis {
   /// What its part of a group move would be; nothing is begun yet. Errors: as of submit(); moving, busy (a
   /// member has to rest).
   Result<Plan> plan_member(const GroupMemberRequest& request, const CommandOptions& options);
-  [[nodiscard]] const Planner& planner() const { return planner_; }
+  [[nodiscard]] const Planner& planner() const { return context_.planner; }
   /// Pulses from where it stands to the plan's target.
   [[nodiscard]] std::int64_t way_of(const Plan& plan) const {
-    return plan.target.value().counter - tracker_.counter();
+    return plan.target.value().counter - shaft_.tracker().counter();
   }
 
   /// Accepts or refuses a request. What becomes of an accepted one is in its command.
@@ -120,9 +112,9 @@ class Axis {
   void bus_lost(Error cause);
 
   // For work on the drive beside motion: parameters, segments, memory (drive_operations.hpp).
-  [[nodiscard]] Drive& drive() { return *drive_; }
-  [[nodiscard]] const DriveDescriptor& descriptor() const { return *descriptor_; }
-  [[nodiscard]] const Scale& scale() const { return scale_; }
+  [[nodiscard]] Drive& drive() { return *context_.drive; }
+  [[nodiscard]] const DriveDescriptor& descriptor() const { return *context_.descriptor; }
+  [[nodiscard]] const Scale& scale() const { return context_.scale; }
   [[nodiscard]] const std::optional<DriveIdentity>& identity() const { return identity_; }
   [[nodiscard]] std::uint64_t eeprom_writes() const { return eeprom_writes_; }
   /// Since start.
@@ -137,11 +129,13 @@ class Axis {
   /// The drive's segment table holds targets that count from its own zero.
   void set_absolute_segments(bool absolute) { absolute_segments_ = absolute; }
   /// The position is the drive's counter and the configured position at home, nothing else.
-  [[nodiscard]] bool position_is_from_home() const { return is_from_home(tracker_.offset()); }
+  [[nodiscard]] bool position_is_from_home() const {
+    return context_.is_from_home(shaft_.tracker().offset());
+  }
   /// The drive's memory is no longer what configure() made it: applied again. `position_lost`: the counter or
   /// its meaning, too.
   void reconfigure(const std::string& why, bool position_lost);
-  [[nodiscard]] const AxisSettings& settings() const { return settings_; }
+  [[nodiscard]] const AxisSettings& settings() const { return context_.settings; }
   /// Nothing moves, as far as is known, and no stop is under way.
   [[nodiscard]] bool at_rest() const;
   /// From a stop's request to its frame, by the bus budget; what takes longer is told once.
@@ -149,11 +143,11 @@ class Axis {
   /// Longest times seen, beside those of the bus budget.
   [[nodiscard]] const ObservedAxis& observed() const { return observed_.values(); }
   /// Thread: any.
-  [[nodiscard]] const std::shared_ptr<AxisGate>& gate() const { return gate_; }
+  [[nodiscard]] const std::shared_ptr<AxisGate>& gate() const { return context_.gate; }
   /// Thread: any.
-  [[nodiscard]] AxisSnapshotPtr snapshot() const { return face_->snapshot.load(); }
+  [[nodiscard]] AxisSnapshotPtr snapshot() const { return context_.face->snapshot.load(); }
   /// What is left of it when it is gone. Thread: any.
-  [[nodiscard]] const AxisFacePtr& face() const { return face_; }
+  [[nodiscard]] const AxisFacePtr& face() const { return context_.face; }
 
  private:
   class Chain;  ///< chain.hpp
@@ -167,7 +161,6 @@ class Axis {
   /// `again`: the attempt before was in vain.
   Task<Result<void>> try_connect(TransactionClass contact, bool again);
   Task<Result<void>> settle_found_motion();
-  [[nodiscard]] bool found_in_motion() const;
   [[nodiscard]] bool may_have_been_stopped_abruptly() const;
   [[nodiscard]] std::vector<std::int64_t> unseen_ends() const;
   [[nodiscard]] bool found_by_terminal() const;
@@ -245,17 +238,6 @@ class Axis {
   [[nodiscard]] bool works() const;
   /// Its start waits for those of others, or for its moment: its drive rests until then.
   [[nodiscard]] bool bides() const;
-  [[nodiscard]] std::int64_t home_offset() const;
-  /// This offset of the position is that of home, as far as a reading tells (M30).
-  [[nodiscard]] bool is_from_home(std::int64_t offset) const;
-  /// The position follows a shaft that is turned while the motor is released: in closed loop only, and where
-  /// that is known (M20).
-  [[nodiscard]] bool counts_while_released() const;
-  /// What a terminal does while nobody looks would not show: homing zeroes the counter, a release lets the
-  /// shaft be turned uncounted (M20).
-  [[nodiscard]] bool terminal_may_void_position() const;
-  [[nodiscard]] bool input_active(std::string_view function) const;
-  [[nodiscard]] bool limit_active(bool positive) const;
   [[nodiscard]] ShaftWatch::Facts shaft_facts() const;
   void lose_trust();
   void remember_position();
@@ -277,9 +259,6 @@ class Axis {
   void execute_stop(const StopRequest& request, const CommandOptions& options, CommandPtr command);
   Result<CommandPtr> accept(const ResetRequest& request, const CommandOptions& options);
   Result<CommandPtr> accept(const SetPositionRequest& request, const CommandOptions& options);
-  [[nodiscard]] double velocity_of(const MotionValues& with) const;
-  [[nodiscard]] PositionTracker::Target target_of(const MoveAbsoluteRequest& request,
-                                                  const PositionTracker& from) const;
   Result<CommandPtr> accept(const GroupMemberRequest& request, const CommandOptions& options) const;
   [[nodiscard]] Result<Plan> plan_move(const PositionTracker::Target& target, const MotionValues& with) const;
   [[nodiscard]] Result<Plan> plan_velocity(double velocity, const MotionValues& with, bool jog) const;
@@ -313,8 +292,6 @@ class Axis {
   void look_at_buffered(const Action& action, CommandOptions options, Obstacles& found) const;
   void look_at(const GroupMemberRequest& request, const CommandOptions& options, Obstacles& found) const;
   void look_at_options(const CommandOptions& options, Obstacles& found) const;
-  [[nodiscard]] Error reloading() const;
-  [[nodiscard]] Error ending() const;
   void look_at_holds(const CommandOptions& options, Obstacles& found) const;
   void look_at_link(Obstacles& found) const;
   void look_at_fault(Obstacles& found) const;
@@ -325,16 +302,11 @@ class Axis {
   void look_at_motion(const CommandOptions& options, Obstacles& found) const;
   void look_at_direction(bool positive, Obstacles& found) const;
   void look_at_target(const PositionTracker::Target& target, Obstacles& found) const;
-  /// Jogs and velocity moves are refused on a drive without velocity mode. Errors: not_supported.
-  [[nodiscard]] Result<void> check_velocity_mode() const;
   void look_at_velocity(double velocity, const MotionValues& with, bool jog, Obstacles& found) const;
   void look_at_holding_terminals(std::span<const std::string_view> functions, Obstacles& found) const;
   void look_at_present_motion(Obstacles& found) const;
   void look_at_line(Obstacles& found) const;
   void look_at_what_forbids_some(Obstacles& found) const;
-  [[nodiscard]] std::string shell(std::string_view command, std::string_view rest = {}) const;
-  [[nodiscard]] Error not_trusted(std::string message) const;
-  [[nodiscard]] Error direction_blocked(bool positive) const;
 
   // axis_motion.cpp: sequences; axis_rezero.cpp: make_room()
   [[nodiscard]] bool current(const Activity& activity) const;
@@ -346,13 +318,10 @@ class Axis {
   Task<bool> counter_shows_zero();
   Task<bool> positioned(ActivityPtr activity);
   bool may_start(Activity& activity);
-  [[nodiscard]] Error moved_before_start() const;
   Task<bool> take_turn(ActivityPtr activity);
 
   // axis_aim.cpp: where a motion starts from, and where it goes (M19)
   Task<Result<void>> look(Duration oldest);
-  [[nodiscard]] bool looks_restarted(const DriveSample& sample) const;
-  [[nodiscard]] bool may_move_by_itself() const;
   Result<void> aim(Activity& activity);
   [[nodiscard]] Result<void> check_direction(const Activity& activity,
                                              const PositionTracker::Target& target) const;
@@ -387,16 +356,6 @@ class Axis {
   Task<bool> still_there(ActivityPtr activity);
   Task<bool> proven_continuous(ActivityPtr activity);
 
-  /// A measured position comes to its target so late, at most, after the drive has sent its last pulse (M30).
-  [[nodiscard]] Duration settling() const;
-  /// Pulses from its target at which the axis has arrived: `position_tolerance`, and at least what the drive
-  /// itself takes for in position.
-  [[nodiscard]] std::int64_t target_tolerance() const;
-  [[nodiscard]] bool is_at(const PositionTracker::Target& target) const;
-  /// There, or beside it by no more than a measured position may waver (M30).
-  [[nodiscard]] bool is_near(const PositionTracker::Target& target) const;
-  /// The shaft is elsewhere than it was at `counter`: further than a measurement wavers.
-  [[nodiscard]] bool moved_from(std::int64_t counter) const;
   Task<Result<DriveSample>> sample_after(TimePoint since, Duration patience);
   Task<Result<void>> journal_offset(std::int64_t offset, PositionTrust trust);
   [[nodiscard]] OffsetRecord offset_record(std::int64_t offset, PositionTrust trust) const;
@@ -428,9 +387,6 @@ class Axis {
   [[nodiscard]] HomingMachine followed_homing(TimePoint since, bool homed_before) const;
   Task<bool> follow_homing(ActivityPtr activity, TimePoint since, bool homed_before);
   [[nodiscard]] Error not_homed(HomingMachine::State state) const;
-  [[nodiscard]] std::string_view homing_switch() const;
-  /// The switch that homing searches for is active; false: not, or the search is the drive's own affair.
-  [[nodiscard]] bool on_homing_switch() const;
   [[nodiscard]] Error reached_switch() const;
   [[nodiscard]] std::int64_t counter_at_home() const;
 
@@ -454,21 +410,9 @@ class Axis {
   Task<RestVerdict> standstill_by(bool acknowledged, TimePoint deadline);
   Task<bool> standstill_unpolled(TimePoint deadline, bool of_stop);
   void leave_running(const Activity& activity);
-  [[nodiscard]] Error error(Reason reason, std::string message, std::string remedy = {}) const;
-  /// "{what} alarm 2 (overvoltage)", with what there is to do.
-  [[nodiscard]] Error alarm_error(std::uint16_t code, std::string_view what) const;
 
-  AxisEnvironment env_;
-  AxisSettings settings_;
-  const DriveDescriptor* descriptor_;
-  Scale scale_;
-  Terminals terminals_;
-  Planner planner_;
-  PositionTracker tracker_;
-  std::unique_ptr<Drive> drive_;
-  AxisFacePtr face_;
-  std::shared_ptr<AxisGate> gate_;  ///< that of the face
-  bool simulated_;
+  AxisContext context_;
+  Shaft shaft_;
 
   LinkMachine link_;
   std::optional<DriveIdentity> identity_;
@@ -490,8 +434,6 @@ class Axis {
   StopMachine stop_;
   PowerMachine power_;
 
-  std::optional<DriveSample> sample_;
-  Signal sampled_;  ///< a new sample, or the link changed
   Signal wake_;     ///< the poll loop has something to look at
   Signal stopped_;  ///< the stop sequence ended
   int chains_ = 0;
@@ -502,8 +444,6 @@ class Axis {
   CommandBuffer buffer_;
   ObservedTimes observed_;
   SpeedWatch speed_watch_;
-  TerminalMotion terminal_motion_;
-  ShaftWatch shaft_;
   std::optional<Error> fault_;
   boost::shared_ptr<AxisSnapshot> shown_;  ///< the last snapshot
   std::uint64_t revision_ = 0;

@@ -14,13 +14,14 @@ namespace axisd {
 /// Drive::read_state().
 Task<Result<void>> Axis::look(Duration oldest) {
   constexpr int attempts = 3;
-  if (sample_ && sample_->asked_at >= env_.clock->now() - oldest) co_return Result<void>{};
+  if (shaft_.sample() && shaft_.sample()->asked_at >= context_.env.clock->now() - oldest)
+    co_return Result<void>{};
   const Chain chain(*this);
   for (int attempt = 1;; ++attempt) {
-    const auto sample = co_await drive_->read_state(TransactionClass::motion);
+    const auto sample = co_await context_.drive->read_state(TransactionClass::motion);
     auto seen = sample ? Result<void>{} : fail(sample.error());
     // What a restart leaves behind must not be taken for a release, or for a shaft that was turned.
-    if (sample && looks_restarted(*sample)) seen = co_await prove_continuity(TransactionClass::motion);
+    if (sample && shaft_.looks_restarted(*sample)) seen = co_await prove_continuity(TransactionClass::motion);
     if (seen) {
       on_sample(*sample);
       co_return seen;
@@ -32,40 +33,25 @@ Task<Result<void>> Axis::look(Duration oldest) {
   }
 }
 
-/// It may be the first reading of another power cycle.
-bool Axis::looks_restarted(const DriveSample& sample) const {
-  if (!sample_) return false;
-  const auto step = std::int64_t{sample.position_pulses} - sample_->position_pulses;
-  return sample.enabled != sample_->enabled || (!sample.moving && std::abs(step) > drive_->position_window());
-}
-
-/// Terminals could move or release the drive between two readings. Without such ones only that happens which
-/// the canary would show.
-bool Axis::may_move_by_itself() const {
-  const bool by_terminal = std::ranges::any_of(settings_.inputs, [this](const TerminalSettings& input) {
-    return terminals_.starts_motion(input) || input.function == "motor_free";
-  });
-  return by_terminal || drive_->moves_by_itself();
-}
-
 /// Plans the activity's motion anew, from where the shaft is: the counter may mean something else since it
 /// was accepted (homing, SetPosition, zeroing), and the shaft may have been moved (M19). Errors: as of
 /// Planner::move().
 Result<void> Axis::aim(Activity& activity) {
   auto& plan = activity.plan;
-  tracker_.settle_base();
+  shaft_.tracker().settle_base();
   const auto velocity = plan.granted.velocity;
   const auto& command = activity.command->value();
-  auto target = tracker_.again(*plan.target);
+  auto target = shaft_.tracker().again(*plan.target);
   // The shorter way round is that from where the axis rests.
-  if (command.kind == CommandKind::move_absolute && settings_.scale.modulo)
-    target = target_of({.position = command.asked.position.value_or(target.position)}, tracker_);
+  if (command.kind == CommandKind::move_absolute && context_.settings.scale.modulo)
+    target =
+        context_.target_of({.position = command.asked.position.value_or(target.position)}, shaft_.tracker());
   // What backs off from a switch before homing is bounded by itself.
   if (activity.state == AxisState::homing) {
-    plan = planner_.aimed(std::move(plan), target, tracker_);
+    plan = context_.planner.aimed(std::move(plan), target, shaft_.tracker());
     return {};
   }
-  auto aimed = planner_.move(plan, target, tracker_);
+  auto aimed = context_.planner.move(plan, target, shaft_.tracker());
   if (!aimed) return fail(aimed.error());
   if (auto way = check_direction(activity, target); !way) return way;
   plan = *std::move(aimed);
@@ -77,43 +63,44 @@ Result<void> Axis::aim(Activity& activity) {
 /// A velocity that ends at a limit never leads back to it. Errors: soft_limit.
 Result<void> Axis::check_direction(const Activity& activity, const PositionTracker::Target& target) const {
   const auto& velocity = activity.plan.granted.velocity;
-  if (activity.state != AxisState::continuous_motion || !velocity || tracker_.rests_at(target) ||
-      planner_.positive(target, tracker_) == (*velocity > 0))
+  if (activity.state != AxisState::continuous_motion || !velocity || shaft_.tracker().rests_at(target) ||
+      context_.planner.positive(target, shaft_.tracker()) == (*velocity > 0))
     return {};
-  return fail(error(Reason::soft_limit, "beyond the software limit already", "move the other way"));
+  return fail(context_.error(Reason::soft_limit, "beyond the software limit already", "move the other way"));
 }
 
 /// The drive would go as far as was asked (M19), and the way that was asked for. Errors: moving, soft_limit.
 Result<void> Axis::check_way(const Activity& activity) const {
   const auto& plan = activity.plan;
   if (auto way = check_direction(activity, *plan.target); !way) return way;
-  if (tracker_.deviation(*plan.target) <= drive_->position_window() + 1) return {};
-  return fail(
-      error(Reason::moving,
-            fmt::format("the shaft was moved before the start: from {:.6g} {} the way would be another "
-                        "than the one that was asked for",
-                        tracker_.position(), settings_.scale.unit),
-            "see what moves it; then repeat the move"));
+  if (shaft_.tracker().deviation(*plan.target) <= context_.drive->position_window() + 1) return {};
+  return fail(context_.error(
+      Reason::moving,
+      fmt::format("the shaft was moved before the start: from {:.6g} {} the way would be another "
+                  "than the one that was asked for",
+                  shaft_.tracker().position(), context_.settings.scale.unit),
+      "see what moves it; then repeat the move"));
 }
 
 /// Starts the activity's move from where the shaft was seen within the last `reboot_guard`, all but the
 /// trigger being in the drive already. nullopt: the activity has ended, and nothing was sent.
 Task<std::optional<Result<void>>> Axis::start_unmoved(ActivityPtr activity) {
   constexpr int attempts = 3;
-  auto loaded = co_await drive_->load_move(profile_of(activity->plan), guard(*activity));
+  auto loaded = co_await context_.drive->load_move(profile_of(activity->plan), guard(*activity));
   if (!loaded) co_return fail(loaded.error());
   for (int attempt = 1;; ++attempt) {
     if (auto seen = co_await look(Duration{0}); !seen) co_return seen;
     if (!current(*activity) || !may_start(*activity)) co_return std::nullopt;
     if (auto way = check_way(*activity); !way) co_return way;
-    activity->number = stop_.unseen_start().sending(tracker_.counter(), env_.clock->now());
-    const auto triggered = co_await (*loaded)->trigger(sample_->asked_at + settings_.reboot_guard);
+    activity->number = stop_.unseen_start().sending(shaft_.tracker().counter(), context_.env.clock->now());
+    const auto triggered =
+        co_await (*loaded)->trigger(shaft_.sample()->asked_at + context_.settings.reboot_guard);
     if (triggered) {
       co_await (*loaded)->follow_up();
       co_return Result<void>{};
     }
     const bool grown_old =
-        triggered.error().reason == Reason::expired && env_.clock->now() < guard(*activity).not_after;
+        triggered.error().reason == Reason::expired && context_.env.clock->now() < guard(*activity).not_after;
     if (!grown_old || attempt == attempts) co_return fail(triggered.error());
   }
 }

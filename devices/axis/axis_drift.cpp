@@ -9,7 +9,7 @@ namespace axisd {
 
 /// Soon after the canary was read, if that can be: what a comparison reads would keep the next one waiting.
 bool Axis::drift_is_next() const {
-  const auto now = env_.clock->now();
+  const auto now = context_.env.clock->now();
   return maintenance_.expired() && drift_.is_next(now, continuity_.just_proven(now));
 }
 
@@ -18,7 +18,7 @@ bool Axis::drift_is_next() const {
 /// meanwhile as ever, also of a motion that begins.
 void Axis::look_for_drift() {
   if (!link_.online() || busy()) return;
-  const bool free = maintenance_.expired() && sample_ && !sample_->enabled;
+  const bool free = maintenance_.expired() && shaft_.sample() && !shaft_.sample()->enabled;
   if (drift_.drifted() && free) return reconfigure(drift_.text(), false);
   if (drift_is_next()) launch(compare(), "comparison");
 }
@@ -36,12 +36,12 @@ Task<> Axis::compare() {
 void Axis::give_up_comparison() {
   drift_.give_up();
   comparison_gate_->raise();
-  env_.bus->purge_superseded(settings_.node, *comparison_gate_);
+  context_.env.bus->purge_superseded(context_.settings.node, *comparison_gate_);
 }
 
 Task<Result<void>> Axis::check_for_drift(TransactionOptions options) {
-  const auto number = drift_.begin(env_.clock->now());
-  const auto drift = co_await drive_->check_drift(std::move(options));
+  const auto number = drift_.begin(context_.env.clock->now());
+  const auto drift = co_await context_.drive->check_drift(std::move(options));
   const bool counts = drift_.end(number);
   if (!drift) co_return fail(drift.error());
   // It was configured or written to meanwhile, or connected anew: what was read before says nothing.
@@ -51,9 +51,9 @@ Task<Result<void>> Axis::check_for_drift(TransactionOptions options) {
   // A motion that was accepted while this was being read goes on without what it relies on.
   if ((drift->scale_changed || drift->limits_changed) && activity_ &&
       activity_->state != AxisState::standstill) {
-    enter_error_stop(error(Reason::misconfigured,
-                           "the drive no longer holds its configuration: " + drift->text,
-                           "disable the axis: the configuration is then applied again; then reset it"));
+    enter_error_stop(
+        context_.error(Reason::misconfigured, "the drive no longer holds its configuration: " + drift->text,
+                       "disable the axis: the configuration is then applied again; then reset it"));
     begin_stop(StopKind::stop, nullptr);
   }
   co_return Result<void>{};
@@ -62,8 +62,9 @@ Task<Result<void>> Axis::check_for_drift(TransactionOptions options) {
 void Axis::set_drift(const std::string& text) {
   if (!drift_.found(text)) return;
   if (!text.empty())
-    log_about_axis(spdlog::level::warn, LogKind::configuration_drifted, settings_,
-                   fmt::format("{}: the drive no longer holds its configuration: {}", settings_.name, text));
+    log_about_axis(
+        spdlog::level::warn, LogKind::configuration_drifted, context_.settings,
+        fmt::format("{}: the drive no longer holds its configuration: {}", context_.settings.name, text));
   publish();
 }
 

@@ -46,10 +46,11 @@ Task<std::optional<TimePoint>> Axis::arrived(ActivityPtr activity, std::int64_t 
   activity->motion = followed(activity->plan, base, since);
   for (;; activity->motion->go_on()) {
     if (!co_await follow(activity, base, since)) co_return std::nullopt;
-    const auto when = sample_->measured_at;
+    const auto when = shaft_.sample()->measured_at;
     if (!co_await is_no_reboot(activity)) co_return std::nullopt;
     // While its proof was waited for a terminal may have begun another motion.
-    if (sample_->moving || sample_->mode != DriveMode::positioning || !is_at(*activity->plan.target))
+    if (shaft_.sample()->moving || shaft_.sample()->mode != DriveMode::positioning ||
+        !shaft_.is_at(*activity->plan.target))
       continue;
     if (watch_speed(SpeedWatch::Event::arrived)) co_return std::nullopt;
     co_return when;
@@ -59,28 +60,28 @@ Task<std::optional<TimePoint>> Axis::arrived(ActivityPtr activity, std::int64_t 
 /// A drive that was restarted, on the way or before, shows the counter 0: only where the reading at the
 /// target could be that, too, it has to prove that it is the same one.
 Task<bool> Axis::is_no_reboot(ActivityPtr activity) {
-  if (sample_ && drive_->rules_out_restart(*sample_)) {
+  if (shaft_.sample() && context_.drive->rules_out_restart(*shaft_.sample())) {
     // Else the canary would seem to be due, and a reading beside it would wait for the next start's place.
-    if (const auto proven = drive_->proven_at()) continuity_.proven(*proven);
+    if (const auto proven = context_.drive->proven_at()) continuity_.proven(*proven);
     co_return true;
   }
-  keep_quiet(env_.clock->now() + std::min<Duration>(settings_.poll_moving, proof_patience));
+  keep_quiet(context_.env.clock->now() + std::min<Duration>(context_.settings.poll_moving, proof_patience));
   co_return co_await proven_continuous(activity);
 }
 
 /// Nothing was sent, as the axis rested at its target when it was read: what a terminal did since is looked
 /// for before it is called Done. False: the activity has ended.
 Task<bool> Axis::still_there(ActivityPtr activity) {
-  if (!may_move_by_itself()) co_return true;
-  const auto since = env_.clock->now();
-  while (!sample_ || sample_->asked_at < since) {
+  if (!context_.may_move_by_itself()) co_return true;
+  const auto since = context_.env.clock->now();
+  while (!shaft_.sample() || shaft_.sample()->asked_at < since) {
     wake();
-    co_await sampled_.wait_until(env_.clock->now() + milliseconds(50));
+    co_await shaft_.sampled().wait_until(context_.env.clock->now() + milliseconds(50));
     if (!current(*activity)) co_return false;  // offline, too
   }
-  if (!found_in_motion() && is_at(*activity->plan.target)) co_return true;
-  auto cause = error(Reason::moving, "the shaft was moved while the axis rested at its target",
-                     "see what moves it; then repeat the move");
+  if (!shaft_.found_in_motion() && shaft_.is_at(*activity->plan.target)) co_return true;
+  auto cause = context_.error(Reason::moving, "the shaft was moved while the axis rested at its target",
+                              "see what moves it; then repeat the move");
   cause.outcome = Outcome::not_executed;
   tell_part(*activity, cause);
   finish(*activity, [&](CommandRecord& command) { command.error(std::move(cause)); });
@@ -112,25 +113,29 @@ Task<bool> Axis::read_back(ActivityPtr activity, Error cause, std::int64_t base,
   StartReadback readback(since);
   while (readback.state() == State::reading) {
     wake();
-    co_await sampled_.wait_until(std::max(readback.deadline(), env_.clock->now() + milliseconds(50)));
+    co_await shaft_.sampled().wait_until(
+        std::max(readback.deadline(), context_.env.clock->now() + milliseconds(50)));
     if (!current(*activity)) {  // offline, too: then the command has ended as unknown
       readback.superseded();
       break;
     }
-    readback.look(readback_of(base), env_.clock->now());
+    readback.look(readback_of(base), context_.env.clock->now());
   }
   // Its standstill is no proof: a restart would have ended a motion, too.
   const bool proven = readback.state() == State::resting && co_await proven_continuous(activity);
   // Proven continuous, it did not start; unless a pulse at a terminal, between two readings, ended the motion
   // as it began, or took the shaft back, or it rests where it would have arrived, or elsewhere than it was.
-  const bool terminals_may_hide_it = terminals_.may_start_motion() || terminals_.has("motor_free") ||
-                                     terminals_.has("stop") || terminals_.has("quick_stop");
+  const bool terminals_may_hide_it = context_.terminals.may_start_motion() ||
+                                     context_.terminals.has("motor_free") || context_.terminals.has("stop") ||
+                                     context_.terminals.has("quick_stop");
   const bool moves_to_a_target = activity->state != AxisState::homing && !activity->plan.endless;
   const auto is_at_target = [&] {
-    return std::abs(tracker_.counter() - activity->plan.target->counter) <= drive_->position_window();
+    return std::abs(shaft_.tracker().counter() - activity->plan.target->counter) <=
+           context_.drive->position_window();
   };
   if (proven)
-    readback.proven(!terminals_may_hide_it && !moved_from(base) && !(moves_to_a_target && is_at_target()));
+    readback.proven(!terminals_may_hide_it && !shaft_.moved_from(base) &&
+                    !(moves_to_a_target && is_at_target()));
   else if (readback.state() == State::resting)
     readback.superseded();
   count(unknown_starts_, readback.state());
@@ -143,7 +148,7 @@ Task<bool> Axis::read_back(ActivityPtr activity, Error cause, std::int64_t base,
   if (readback.state() == State::not_executed) {
     cause.outcome = Outcome::not_executed;
     cause.message =
-        fmt::format("{}: the start frame {}, and the drive did not move: {}", settings_.name,
+        fmt::format("{}: the start frame {}, and the drive did not move: {}", context_.settings.name,
                     cause.reason == Reason::refused ? "was refused" : "got no reply", cause.message);
     tell_part(*activity, cause);
   }
@@ -153,25 +158,27 @@ Task<bool> Axis::read_back(ActivityPtr activity, Error cause, std::int64_t base,
 
 /// What the newest reading says of the activity's start from `base`. Precondition: there is an activity.
 std::optional<StartReadback::Reading> Axis::readback_of(std::int64_t base) const {
-  if (!sample_) return std::nullopt;
+  if (!shaft_.sample()) return std::nullopt;
   const auto& target = activity_->plan.target;
-  const bool certain = drive_->position_window() == 0 ||
-                       (target && has_come(tracker_.counter(), base, target->counter, target_tolerance()));
-  return StartReadback::Reading{.asked_at = sample_->asked_at,
-                                .shows_it = sample_->moving || (certain && moved_from(base)) ||
-                                            sample_->mode != DriveMode::positioning};
+  const bool certain =
+      context_.drive->position_window() == 0 ||
+      (target && has_come(shaft_.tracker().counter(), base, target->counter, context_.target_tolerance()));
+  return StartReadback::Reading{.asked_at = shaft_.sample()->asked_at,
+                                .shows_it = shaft_.sample()->moving || (certain && shaft_.moved_from(base)) ||
+                                            shaft_.sample()->mode != DriveMode::positioning};
 }
 
 /// A position tells that the motion was executed. Where its drive takes it for arrived it may still be that
 /// window short of its target (M30).
 bool Axis::shows(const Plan& plan, std::int64_t base) const {
-  const auto window = drive_->position_window();
+  const auto window = context_.drive->position_window();
   return window == 0 || std::abs(plan.target->counter - base) > 2 * window;
 }
 
 /// At rest, and not at the target.
 bool Axis::held_back(const Plan& plan) const {
-  return limit_active(plan.positive) || input_active("stop") || input_active("quick_stop");
+  return shaft_.limit_active(plan.positive) || shaft_.input_active("stop") ||
+         shaft_.input_active("quick_stop");
 }
 
 /// When a motion is read that was acknowledged at `since`: its end is to be told at once, and before it has
@@ -182,13 +189,13 @@ void Axis::expect_end(const Plan& plan, std::int64_t base, TimePoint since) {
   if (!plan.endless && !shows(plan, base))
     return poll_fast(since, std::max(plan.predicted, start_window) + end_window);
   if (!plan.endless) {
-    const auto soonest = planner_.soonest(plan, plan.target->counter - base);
+    const auto soonest = context_.planner.soonest(plan, plan.target->counter - base);
     const auto lead = std::min(soonest / end_lead_share, longest_end_lead);
     poll_for_end(since + soonest - lead, plan.predicted - soonest + lead + end_window);
   }
   keep_quiet(std::min(pace_.next(since, true), since + longest_quiet));
   // What the poll loop asked for before the start would come too early, and keep the next one waiting.
-  env_.bus->give_up_readings(settings_.node);
+  context_.env.bus->give_up_readings(context_.settings.node);
 }
 
 /// A motion by that plan, which was acknowledged at `since`.
@@ -197,22 +204,22 @@ MotionMachine Axis::followed(const Plan& plan, std::int64_t base, TimePoint sinc
                         .predicted = plan.predicted,
                         .endless = plan.endless,
                         .unseen = !plan.endless && !shows(plan, base),
-                        .settling = settling()});
+                        .settling = context_.settling()});
 }
 
 /// What the newest reading says of a motion by that plan, from `base`. Precondition: there is one.
 MotionMachine::Reading Axis::reading_of(const Plan& plan, std::int64_t base) const {
-  const bool certain =
-      drive_->position_window() == 0 || held_back(plan) ||
-      (plan.target && has_come(tracker_.counter(), base, plan.target->counter, target_tolerance()));
-  return {.asked_at = sample_->asked_at,
-          .positioning = sample_->mode == DriveMode::positioning,
-          .moving = sample_->moving,
-          .elsewhere = certain && moved_from(base),
-          .at_target = !plan.endless && is_at(*plan.target),
-          .near_target = !plan.endless && is_near(*plan.target),
-          .beside = !plan.endless && moved_from(base) && !is_at(*plan.target),
-          .in_position = drive_->position_window() == 0 || sample_->in_position,
+  const bool certain = context_.drive->position_window() == 0 || held_back(plan) ||
+                       (plan.target && has_come(shaft_.tracker().counter(), base, plan.target->counter,
+                                                context_.target_tolerance()));
+  return {.asked_at = shaft_.sample()->asked_at,
+          .positioning = shaft_.sample()->mode == DriveMode::positioning,
+          .moving = shaft_.sample()->moving,
+          .elsewhere = certain && shaft_.moved_from(base),
+          .at_target = !plan.endless && shaft_.is_at(*plan.target),
+          .near_target = !plan.endless && shaft_.is_near(*plan.target),
+          .beside = !plan.endless && shaft_.moved_from(base) && !shaft_.is_at(*plan.target),
+          .in_position = context_.drive->position_window() == 0 || shaft_.sample()->in_position,
           .held_back = held_back(plan),
           .astray = is_astray(plan, base)};
 }
@@ -220,10 +227,11 @@ MotionMachine::Reading Axis::reading_of(const Plan& plan, std::int64_t base) con
 /// The drive executes another motion, such as the one that this one replaced: the shaft is behind `base`, or
 /// beyond the target, by more than it settles or is turned as it is taken hold of.
 bool Axis::is_astray(const Plan& plan, std::int64_t base) const {
-  const auto margin = std::max(settings_.scale.pulses_per_revolution / 8, 8 * drive_->position_window());
+  const auto margin =
+      std::max(context_.settings.scale.pulses_per_revolution / 8, 8 * context_.drive->position_window());
   const auto way = plan.endless ? 0 : plan.target->counter - base;
-  const bool positive = plan.endless ? plan.positive != settings_.scale.invert : way > 0;
-  const auto gone = positive ? tracker_.counter() - base : base - tracker_.counter();
+  const bool positive = plan.endless ? plan.positive != context_.settings.scale.invert : way > 0;
+  const auto gone = positive ? shaft_.tracker().counter() - base : base - shaft_.tracker().counter();
   return gone < -margin || (!plan.endless && gone > std::abs(way) + margin);
 }
 
@@ -236,16 +244,16 @@ Task<bool> Axis::follow(ActivityPtr activity, std::int64_t base, TimePoint since
   expect_end(plan, base, since);
   for (;;) {
     const auto deadline = std::min(activity->hold_until.value_or(motion.latest()), motion.latest());
-    co_await sampled_.wait_until(std::max(deadline, env_.clock->now() + milliseconds(20)));
+    co_await shaft_.sampled().wait_until(std::max(deadline, context_.env.clock->now() + milliseconds(20)));
     if (!current(*activity)) co_return false;
-    if (activity->hold_until && env_.clock->now() >= *activity->hold_until) {
+    if (activity->hold_until && context_.env.clock->now() >= *activity->hold_until) {
       end_hold(*activity);
       co_return false;
     }
-    if (!sample_) continue;
+    if (!shaft_.sample()) continue;
     auto reading = reading_of(plan, base);
     if (reading.asked_at >= since + start_window)
-      reading.elsewhere = moved_from(base);  // nothing settles so long
+      reading.elsewhere = shaft_.moved_from(base);  // nothing settles so long
     const auto state = motion.look(reading);
     if (state <= State::settling) continue;
     pace_.came();
@@ -261,8 +269,8 @@ void Axis::end_hold(Activity& activity) {
   revoke_motion();
   leave_running(activity);
   begin_stop(StopKind::halt, nullptr);
-  auto cause =
-      error(Reason::expired, "the hold was not renewed in time", "repeat the call within its hold time");
+  auto cause = context_.error(Reason::expired, "the hold was not renewed in time",
+                              "repeat the call within its hold time");
   finish(activity, [&](CommandRecord& command) { command.abort(std::move(cause)); });
 }
 
@@ -270,20 +278,22 @@ void Axis::end_hold(Activity& activity) {
 void Axis::end_motion(Activity& activity, MotionMachine::State state) {
   switch (state) {
     case MotionMachine::State::taken_over:
-      return fail_with_stop(activity, error(Reason::terminal, "a terminal of the drive took over the motion",
-                                            "check the terminals"));
+      return fail_with_stop(activity,
+                            context_.error(Reason::terminal, "a terminal of the drive took over the motion",
+                                           "check the terminals"));
     case MotionMachine::State::astray:
       return fail_with_stop(
-          activity, error(Reason::not_reached, "the drive moves away from its target, and is being stopped",
-                          "look at the machine; check load, tuning, and other masters on the bus"));
+          activity,
+          context_.error(Reason::not_reached, "the drive moves away from its target, and is being stopped",
+                         "look at the machine; check load, tuning, and other masters on the bus"));
     case MotionMachine::State::did_not_start:
-      return fail_with_stop(activity,
-                            error(Reason::did_not_start, "the drive accepted the start but does not move",
-                                  "check limit and stop terminals, enable and alarm"));
+      return fail_with_stop(
+          activity, context_.error(Reason::did_not_start, "the drive accepted the start but does not move",
+                                   "check limit and stop terminals, enable and alarm"));
     case MotionMachine::State::took_too_long:
-      return fail_with_stop(activity,
-                            error(Reason::took_too_long, "the motion takes longer than predicted; stopped",
-                                  "check the load, and other masters on the bus"));
+      return fail_with_stop(
+          activity, context_.error(Reason::took_too_long, "the motion takes longer than predicted; stopped",
+                                   "check the load, and other masters on the bus"));
     default:
       return end_at_rest(activity);
   }
@@ -292,36 +302,37 @@ void Axis::end_motion(Activity& activity, MotionMachine::State state) {
 /// The drive rests, but not at the target: says why, and ends the activity.
 void Axis::end_at_rest(Activity& activity) {
   const auto positive = activity.plan.positive;
-  if (limit_active(positive)) {
-    if (!drive_->closed_loop()) lose_trust();  // the overtravel stop has no ramp (M20)
-    return abort_at_rest(activity, error(Reason::limit_switch,
-                                         fmt::format("the {} limit switch ended the motion",
-                                                     positive ? "positive" : "negative"),
-                                         "move away from it; home the axis"));
+  if (shaft_.limit_active(positive)) {
+    if (!context_.drive->closed_loop()) lose_trust();  // the overtravel stop has no ramp (M20)
+    return abort_at_rest(activity, context_.error(Reason::limit_switch,
+                                                  fmt::format("the {} limit switch ended the motion",
+                                                              positive ? "positive" : "negative"),
+                                                  "move away from it; home the axis"));
   }
-  const bool terminal = input_active("stop") || input_active("quick_stop");
+  const bool terminal = shaft_.input_active("stop") || shaft_.input_active("quick_stop");
   // Without a ramp an open loop may have lost steps (M20). A short pulse at a terminal, or another master,
   // leaves nothing by which to tell the kind of stop.
-  if (!drive_->closed_loop() && !input_active("stop")) lose_trust();
+  if (!context_.drive->closed_loop() && !shaft_.input_active("stop")) lose_trust();
   if (terminal)
-    return abort_at_rest(activity, error(Reason::terminal, "a stop terminal of the drive ended the motion",
-                                         "check the terminals"));
+    return abort_at_rest(activity,
+                         context_.error(Reason::terminal, "a stop terminal of the drive ended the motion",
+                                        "check the terminals"));
   const auto& target = activity.plan.target;
-  const auto short_of = target ? std::abs(tracker_.counter() - target->counter) : std::int64_t{0};
-  auto cause =
-      error(Reason::not_reached,
-            fmt::format("the drive came to rest at {:.6g} {}", tracker_.position(), settings_.scale.unit),
-            "check terminals, and other masters on the bus");
+  const auto short_of = target ? std::abs(shaft_.tracker().counter() - target->counter) : std::int64_t{0};
+  auto cause = context_.error(Reason::not_reached,
+                              fmt::format("the drive came to rest at {:.6g} {}", shaft_.tracker().position(),
+                                          context_.settings.scale.unit),
+                              "check terminals, and other masters on the bus");
   // The loop gives an alarm where it is further off; what ended the motion on its way is mostly further, too.
-  if (drive_->closed_loop() && target && short_of < settings_.scale.pulses_per_revolution) {
-    cause.message +=
-        fmt::format(", {:.3g} {} from its target",
-                    static_cast<double>(short_of) / std::abs(scale_.pulses_per_unit()), settings_.scale.unit);
+  if (context_.drive->closed_loop() && target && short_of < context_.settings.scale.pulses_per_revolution) {
+    cause.message += fmt::format(", {:.3g} {} from its target",
+                                 static_cast<double>(short_of) / std::abs(context_.scale.pulses_per_unit()),
+                                 context_.settings.scale.unit);
     cause.remedy =
         fmt::format(
             "check what holds or loads the shaft, the drive's current, and its tuning if the shaft takes "
             "longer than {} ms to settle; a larger position_tolerance permits more; else ",
-            settling() / milliseconds(1)) +
+            context_.settling() / milliseconds(1)) +
         cause.remedy;
   }
   fail_with_stop(activity, std::move(cause));

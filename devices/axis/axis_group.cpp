@@ -15,19 +15,20 @@ constexpr int attempts = 3;
 }  // namespace
 
 Result<Plan> Axis::plan_member(const GroupMemberRequest& request, const CommandOptions& options) {
-  accept_epoch_ = gate_->epoch();
+  accept_epoch_ = context_.gate->epoch();
   if (options.buffer_mode == BufferMode::buffered)
-    return fail(error(Reason::not_supported, "a group move cannot be buffered",
-                      "send it when its members rest, with the buffer mode aborting"));
+    return fail(context_.error(Reason::not_supported, "a group move cannot be buffered",
+                               "send it when its members rest, with the buffer mode aborting"));
   Obstacles found;
   look_at(request, options, found);
   if (auto permitted = found.verdict(); !permitted) return fail(permitted.error());
-  const auto target = request.position
-                          ? target_of(MoveAbsoluteRequest{.position = *request.position}, tracker_)
-                          : tracker_.plan_relative(request.distance.value_or(0));
+  const auto target =
+      request.position
+          ? context_.target_of(MoveAbsoluteRequest{.position = *request.position}, shaft_.tracker())
+          : shaft_.tracker().plan_relative(request.distance.value_or(0));
   auto plan = plan_move(target, request.with);
   if (!plan) return plan;
-  if (request.position) plan->trusted = settings_.require_trust;
+  if (request.position) plan->trusted = context_.settings.require_trust;
   return plan;
 }
 
@@ -39,14 +40,15 @@ void Axis::look_at(const GroupMemberRequest& request, const CommandOptions& opti
     look_at(MoveRelativeRequest{.distance = request.distance.value_or(0), .with = request.with}, options,
             found);
   if (activity_ && activity_->state == AxisState::standstill)
-    found.block(error(Reason::busy, "another command is being executed", "wait for it"));
-  else if (activity_ || stop_.under_way() || (sample_ && sample_->moving))
-    found.block(
-        error(Reason::moving, "a member of a group move has to rest", "wait for standstill, or halt it"));
+    found.block(context_.error(Reason::busy, "another command is being executed", "wait for it"));
+  else if (activity_ || stop_.under_way() || (shaft_.sample() && shaft_.sample()->moving))
+    found.block(context_.error(Reason::moving, "a member of a group move has to rest",
+                               "wait for standstill, or halt it"));
 }
 
 Result<CommandPtr> Axis::accept(const GroupMemberRequest&, const CommandOptions&) const {
-  return fail(error(Reason::not_supported, "this is a part of a group move", "send it with MoveGroup"));
+  return fail(
+      context_.error(Reason::not_supported, "this is a part of a group move", "send it with MoveGroup"));
 }
 
 Task<> Axis::run_member(ActivityPtr activity, std::int64_t base, TimePoint since, bool there,
@@ -58,7 +60,7 @@ Task<> Axis::run_member(ActivityPtr activity, std::int64_t base, TimePoint since
     if (!when) co_return;
     *arrival = when;
   }
-  tracker_.reached(*activity->plan.target, drive_->position_window());
+  shaft_.tracker().reached(*activity->plan.target, context_.drive->position_window());
   remember_position();
   finish(*activity, [](CommandRecord& command) { command.done(); });
 }
@@ -76,9 +78,9 @@ void Axis::Member::let_go() {
 }
 
 bool Axis::Member::ready() const {
-  return current() && axis_->link_.online() && !axis_->link_.bus_loss() && axis_->env_.bus->port().open &&
-         !axis_->fault_ && !axis_->drive_->in_trouble() &&
-         may_send_alone(guard(), axis_->env_.clock->now()) == Verdict::send;
+  return current() && axis_->link_.online() && !axis_->link_.bus_loss() &&
+         axis_->context_.env.bus->port().open && !axis_->fault_ && !axis_->context_.drive->in_trouble() &&
+         may_send_alone(guard(), axis_->context_.env.clock->now()) == Verdict::send;
 }
 
 void Axis::Member::wait_for_others(Duration more) {
@@ -88,7 +90,7 @@ void Axis::Member::wait_for_others(Duration more) {
 
 void Axis::Member::waits_for_turn(bool waits) {
   waits ? activity_->start.queue() : activity_->start.has_turn();
-  if (!waits) axis_->had_turn_ = axis_->env_.clock->now();
+  if (!waits) axis_->had_turn_ = axis_->context_.env.clock->now();
 }
 
 void Axis::Member::tie(std::shared_ptr<const std::vector<MotionGuard>> all, TimePoint not_after) {
@@ -107,30 +109,30 @@ MotionGuard Axis::Member::tied() const {
 Error Axis::Member::gone() const {
   const auto& command = activity_->command->value();
   if (command.cause) return *command.cause;
-  const auto verdict = may_send_alone(guard(), axis_->env_.clock->now());
+  const auto verdict = may_send_alone(guard(), axis_->context_.env.clock->now());
   if (verdict == Verdict::lease_lost)
-    return axis_->error(Reason::lease_lost, "the lease is over", "acquire a lease again");
-  if (verdict == Verdict::expired && axis_->env_.clock->now() > activity_->start_by)
+    return axis_->context_.error(Reason::lease_lost, "the lease is over", "acquire a lease again");
+  if (verdict == Verdict::expired && axis_->context_.env.clock->now() > activity_->start_by)
     return axis_->late(*activity_, {});
   if (verdict == Verdict::expired)
-    return axis_->error(Reason::expired, "the request's validity has passed", "repeat it");
+    return axis_->context_.error(Reason::expired, "the request's validity has passed", "repeat it");
   if (axis_->link_.bus_loss()) return *axis_->link_.bus_loss();
-  if (!axis_->env_.bus->port().open)
-    return axis_->error(Reason::bus_down, "the port was lost before the start", "check the adapter");
-  return axis_->error(Reason::superseded, "a stop came before the start");
+  if (!axis_->context_.env.bus->port().open)
+    return axis_->context_.error(Reason::bus_down, "the port was lost before the start", "check the adapter");
+  return axis_->context_.error(Reason::superseded, "a stop came before the start");
 }
 
 /// Waits for the disk; the axis is looked after meanwhile.
 Task<Result<void>> Axis::Member::note() {
   auto& axis = *axis_;
   if (!ready()) co_return axisd::fail(gone());
-  if (auto seen = co_await axis.look(axis.settings_.reboot_guard); !seen) co_return seen;
+  if (auto seen = co_await axis.look(axis.context_.settings.reboot_guard); !seen) co_return seen;
   if (!ready()) co_return axisd::fail(gone());
   if (auto aimed = axis.aim(*activity_); !aimed) co_return aimed;
   if (auto room = co_await axis.make_room(activity_); !room) co_return room;
   if (!ready()) co_return axisd::fail(gone());
   const auto profile = profile_of(activity_->plan);
-  if (!co_await axis.noted(activity_, axis.note_of(*activity_, axis.drive_->marks_until(profile))))
+  if (!co_await axis.noted(activity_, axis.note_of(*activity_, axis.context_.drive->marks_until(profile))))
     co_return axisd::fail(gone());
   co_return Result<void>{};
 }
@@ -142,14 +144,14 @@ Task<Result<void>> Axis::Member::load() {
   aim();
   if (there_) co_return Result<void>{};
   const auto profile = profile_of(activity_->plan);
-  auto prepared = co_await axis.drive_->prepare_move(profile, tied());
+  auto prepared = co_await axis.context_.drive->prepare_move(profile, tied());
   if (prepared) {
     prepared_ = std::move(*prepared);
     co_return Result<void>{};
   }
   if (prepared.error().reason != Reason::not_supported) co_return axisd::fail(prepared.error());
-  start_note_ = axis.drive_->no_common_start();
-  auto loaded = co_await axis.drive_->load_move(profile, tied());
+  start_note_ = axis.context_.drive->no_common_start();
+  auto loaded = co_await axis.context_.drive->load_move(profile, tied());
   if (!loaded) co_return axisd::fail(loaded.error());
   loaded_ = std::move(*loaded);
   co_return Result<void>{};
@@ -158,17 +160,17 @@ Task<Result<void>> Axis::Member::load() {
 /// From where it stands; a member that was there when it was loaded stays so.
 void Axis::Member::aim() {
   auto& plan = activity_->plan;
-  base_ = axis_->tracker_.counter();
+  base_ = axis_->shaft_.tracker().counter();
   const auto distance = plan.target->counter - base_;
-  there_ = axis_->tracker_.rests_at(*plan.target) ||
-           (there_ && std::abs(distance) <= axis_->drive_->position_window());
-  plan.positive = (distance >= 0) != axis_->settings_.scale.invert;
-  plan.predicted = axis_->planner_.duration(plan, distance);
+  there_ = axis_->shaft_.tracker().rests_at(*plan.target) ||
+           (there_ && std::abs(distance) <= axis_->context_.drive->position_window());
+  plan.positive = (distance >= 0) != axis_->context_.settings.scale.invert;
+  plan.predicted = axis_->context_.planner.duration(plan, distance);
 }
 
 Task<Result<DriveSample>> Axis::Member::read_state() {
   for (int attempt = 1;; ++attempt) {
-    auto sample = co_await axis_->drive_->read_state(TransactionClass::motion);
+    auto sample = co_await axis_->context_.drive->read_state(TransactionClass::motion);
     if (sample || sample.error().reason != Reason::no_reply || attempt == attempts) {
       if (!sample) sample.error().outcome = Outcome::not_executed;  // only read
       co_return sample;
@@ -184,8 +186,8 @@ Task<Result<void>> Axis::Member::look() {
   const bool was_there = there_;
   aim();
   if (was_there && !there_)
-    co_return axisd::fail(
-        axis_->error(Reason::moving, "the axis left its position before the start", "repeat the move"));
+    co_return axisd::fail(axis_->context_.error(Reason::moving, "the axis left its position before the start",
+                                                "repeat the move"));
   if (auto way = axis_->check_way(*activity_); !way) co_return way;
   co_return judge(*sample);
 }
@@ -193,24 +195,27 @@ Task<Result<void>> Axis::Member::look() {
 Result<void> Axis::Member::judge(const DriveSample& sample) const {
   const auto& axis = *axis_;
   if (!sample.enabled)
-    return axisd::fail(axis.error(Reason::disabled, "the power stage is off", "enable the axis first"));
-  if (sample.moving || sample.mode != DriveMode::positioning || axis.terminal_motion_.moves())
-    return axisd::fail(axis.error(Reason::moving, "the drive moves by itself", "check its terminals"));
-  if (axis.terminals_.start_active(sample))
     return axisd::fail(
-        axis.error(Reason::moving, "a terminal that starts motion is active", "check the terminals"));
-  if (activity_->plan.trusted && axis.tracker_.trust() == PositionTrust::unknown)
-    return axisd::fail(axis.error(Reason::not_trusted, "the position was lost before the move could start",
-                                  "home the axis, or set its position"));
-  if (!there_ && axis.limit_active(activity_->plan.positive))
-    return axisd::fail(axis.direction_blocked(activity_->plan.positive));
+        axis.context_.error(Reason::disabled, "the power stage is off", "enable the axis first"));
+  if (sample.moving || sample.mode != DriveMode::positioning || axis.shaft_.terminal_motion().moves())
+    return axisd::fail(
+        axis.context_.error(Reason::moving, "the drive moves by itself", "check its terminals"));
+  if (axis.context_.terminals.start_active(sample))
+    return axisd::fail(axis.context_.error(Reason::moving, "a terminal that starts motion is active",
+                                           "check the terminals"));
+  if (activity_->plan.trusted && axis.shaft_.tracker().trust() == PositionTrust::unknown)
+    return axisd::fail(axis.context_.error(Reason::not_trusted,
+                                           "the position was lost before the move could start",
+                                           "home the axis, or set its position"));
+  if (!there_ && axis.shaft_.limit_active(activity_->plan.positive))
+    return axisd::fail(axis.context_.direction_blocked(activity_->plan.positive));
   return {};
 }
 
 Task<Result<void>> Axis::Member::verify() {
   if (!loaded_ || there_) co_return Result<void>{};
   auto verified = co_await loaded_->verify();
-  if (verified) axis_->continuity_.proven(axis_->env_.clock->now());
+  if (verified) axis_->continuity_.proven(axis_->context_.env.clock->now());
   co_return verified;
 }
 
@@ -219,41 +224,41 @@ void Axis::Member::set_down(TimePoint expires) {
   loaded_.reset();
   chain_.reset();
   activity_->start.set_down();
-  axis_->start_by(activity_, axis_->env_.clock->now(), expires);
+  axis_->start_by(activity_, axis_->context_.env.clock->now(), expires);
 }
 
 void Axis::Member::take_up(TimePoint latest) {
   activity_->start.take_up();
-  axis_->start_by(activity_, axis_->env_.clock->now(), latest);
+  axis_->start_by(activity_, axis_->context_.env.clock->now(), latest);
 }
 
 /// Where something else could have turned the shaft meanwhile: looks once more, right before the trigger.
 Task<Result<TimePoint>> Axis::Member::look_again() {
-  if (!axis_->may_move_by_itself()) co_return TimePoint::max();
+  if (!axis_->context_.may_move_by_itself()) co_return TimePoint::max();
   if (auto seen = co_await look(); !seen) co_return axisd::fail(seen.error());
   if (there_)
     co_return axisd::fail(
-        axis_->error(Reason::moving, "the shaft was moved before the start", "repeat the move"));
+        axis_->context_.error(Reason::moving, "the shaft was moved before the start", "repeat the move"));
   // The SYNC comes up to a period later.
-  const auto guard = axis_->settings_.reboot_guard;
-  co_return axis_->sample_->asked_at + (prepared_ ? guard / 2 : guard);
+  const auto guard = axis_->context_.settings.reboot_guard;
+  co_return axis_->shaft_.sample()->asked_at + (prepared_ ? guard / 2 : guard);
 }
 
 Task<Result<TimePoint>> Axis::Member::trigger(TimePoint not_after) {
   for (int attempt = 1;; ++attempt) {
     const auto seen_until = co_await look_again();
     if (!seen_until) co_return seen_until;
-    activity_->number = axis_->stop_.unseen_start().sending(base_, axis_->env_.clock->now());
+    activity_->number = axis_->stop_.unseen_start().sending(base_, axis_->context_.env.clock->now());
     auto triggered = co_await loaded_->trigger(std::min(*seen_until, not_after));
     const bool grown_old = !triggered && triggered.error().reason == Reason::expired &&
-                           axis_->env_.clock->now() < std::min(tied().not_after, not_after);
+                           axis_->context_.env.clock->now() < std::min(tied().not_after, not_after);
     if (!grown_old || attempt == attempts) co_return triggered;
   }
 }
 
 void Axis::Member::about_to_start() {
   activity_->start.about_to_start();
-  activity_->number = axis_->stop_.unseen_start().sending(base_, axis_->env_.clock->now());
+  activity_->number = axis_->stop_.unseen_start().sending(base_, axis_->context_.env.clock->now());
 }
 
 void Axis::Member::not_started() {
@@ -262,25 +267,26 @@ void Axis::Member::not_started() {
 }
 
 void Axis::Member::started(TimePoint at) {
-  axis_->stop_.unseen_start().sent(activity_->number, axis_->env_.clock->now());
+  axis_->stop_.unseen_start().sent(activity_->number, axis_->context_.env.clock->now());
   started_at_ = at;
   activity_->start.begun();
   axis_->watch_speed(SpeedWatch::Event::begun);
-  axis_->continuity_.proven(axis_->env_.clock->now());  // the canary was part of its start
-  axis_->tracker_.forget_base();
+  axis_->continuity_.proven(axis_->context_.env.clock->now());  // the canary was part of its start
+  axis_->shaft_.tracker().forget_base();
   activity_->command->activate();
   axis_->publish();
 }
 
 Duration Axis::Member::unseen_for() const {
   if (!started_at_ || !current()) return {};
-  const auto seen = axis_->sample_ ? std::max(*started_at_, axis_->sample_->measured_at) : *started_at_;
-  return axis_->env_.clock->now() - seen;
+  const auto seen =
+      axis_->shaft_.sample() ? std::max(*started_at_, axis_->shaft_.sample()->measured_at) : *started_at_;
+  return axis_->context_.env.clock->now() - seen;
 }
 
 Task<Result<void>> Axis::Member::look_after() {
   // As often as polling would.
-  if (axis_->continuity_.state(axis_->env_.clock->now()) >= Continuity::State::due) {
+  if (axis_->continuity_.state(axis_->context_.env.clock->now()) >= Continuity::State::due) {
     const auto proof = co_await axis_->prove_continuity(TransactionClass::motion);
     if (!proof && proof.error().reason == Reason::rebooted && axis_->link_.online())
       axis_->on_reboot(proof.error());
@@ -301,7 +307,7 @@ void Axis::Member::follow() {
   chain_.reset();
   if (!current()) return;
   if (there_) activity_->command->activate();
-  const auto since = started_at_.value_or(axis.env_.clock->now());
+  const auto since = started_at_.value_or(axis.context_.env.clock->now());
   axis.launch(axis.run_member(activity_, base_, since, there_, arrived_), "group move");
 }
 
@@ -323,8 +329,9 @@ void Axis::Member::end(Error cause, bool aborted) {
   auto& axis = *axis_;
   chain_.reset();
   if (axis.activity_ != activity_) return;  // something else ended it, with what that needs
-  const bool own = cause.where.bus == axis.settings_.bus && cause.where.node == axis.settings_.node;
-  if (own && cause.reason == Reason::expired && axis.env_.clock->now() > activity_->start_by)
+  const bool own =
+      cause.where.bus == axis.context_.settings.bus && cause.where.node == axis.context_.settings.node;
+  if (own && cause.reason == Reason::expired && axis.context_.env.clock->now() > activity_->start_by)
     cause = axis.late(*activity_, cause);
   if (!aborted && own && cause.reason == Reason::rebooted) return axis.on_reboot(cause);
   if (!aborted && own && cause.reason == Reason::terminal) return axis.on_turned_by_power(cause);
@@ -332,7 +339,7 @@ void Axis::Member::end(Error cause, bool aborted) {
   axis.revoke_motion();
   if (activity_->start.may_run()) {
     // The stop of one that may move goes out whatever is known of its start.
-    axis.tracker_.forget_base();
+    axis.shaft_.tracker().forget_base();
     axis.leave_running(*activity_);
     axis.note_motion_to_stop();
     if (unknown) {

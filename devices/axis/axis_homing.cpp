@@ -9,36 +9,20 @@
 
 namespace axisd {
 
-bool Axis::on_homing_switch() const {
-  return settings_.homing && !settings_.homing->number && input_active(homing_switch());
-}
-
-std::string_view Axis::homing_switch() const {
-  switch (settings_.homing->method) {
-    case HomingMethod::home_positive:
-    case HomingMethod::home_negative:
-      return "home";
-    case HomingMethod::positive_limit:
-      return "positive_limit";
-    case HomingMethod::negative_limit:
-      return "negative_limit";
-  }
-  return "home";
-}
-
 Task<> Axis::run_home(ActivityPtr activity) {
   if (!co_await reach_standstill(activity)) co_return;
-  const auto profile = planner_.homing();
+  const auto profile = context_.planner.homing();
   if (!profile || !*profile) {
     finish(*activity, [&](CommandRecord& command) {
-      command.error(profile ? error(Reason::not_supported, "no homing is configured") : profile.error());
+      command.error(profile ? context_.error(Reason::not_supported, "no homing is configured")
+                            : profile.error());
     });
     co_return;
   }
-  if (on_homing_switch()) {
+  if (shaft_.on_homing_switch()) {
     if (!co_await back_off(activity)) co_return;
-    const auto now = env_.clock->now();
-    start_by(activity, now, now + settings_.start_within);
+    const auto now = context_.env.clock->now();
+    start_by(activity, now, now + context_.settings.start_within);
   }
 
   // Before it can come true again: homing may end where the saved record says that the axis stood (M20).
@@ -58,46 +42,47 @@ Task<> Axis::run_home(ActivityPtr activity) {
   {
     if (!co_await take_turn(activity)) co_return;
     const Chain chain(*this);
-    if (activity->turn) result = co_await look(settings_.reboot_guard);  // it may have waited long
+    if (activity->turn) result = co_await look(context_.settings.reboot_guard);  // it may have waited long
     if (!current(*activity) || !may_start(*activity)) co_return;
-    if (result && on_homing_switch()) result = axisd::fail(reached_switch());
+    if (result && shaft_.on_homing_switch()) result = axisd::fail(reached_switch());
     if (result) {
       lose_trust();
-      homed_before = sample_->homed;
-      base = tracker_.counter();
-      activity->number = stop_.unseen_start().sending(base, env_.clock->now());
-      result = co_await drive_->start_homing(**profile, guard(*activity));
+      homed_before = shaft_.sample()->homed;
+      base = shaft_.tracker().counter();
+      activity->number = stop_.unseen_start().sending(base, context_.env.clock->now());
+      result = co_await context_.drive->start_homing(**profile, guard(*activity));
     }
   }
   result ? activity->turn.done() : activity->turn.leave();
-  const auto since = env_.clock->now();
+  const auto since = context_.env.clock->now();
   if (!co_await started(activity, std::move(result), base, since)) co_return;
   if (co_await follow_homing(activity, since, homed_before)) co_await declare_home(activity);
 }
 
 /// The drive rests at home: the position there is the one that the configuration says.
 Task<> Axis::declare_home(ActivityPtr activity) {
-  const auto position = settings_.homing->position;
+  const auto position = context_.settings.homing->position;
   // Should the disk fail, the position holds for this run of the daemon; only a restart will not find it.
   const auto counter = counter_at_home();
-  const auto offset = tracker_.offset_for(position) + tracker_.counter() - counter;
+  const auto offset = shaft_.tracker().offset_for(position) + shaft_.tracker().counter() - counter;
   (void)co_await journal_offset(offset, PositionTrust::homed);
   if (!current(*activity)) co_return correct_saved_position();
-  if (moved_from(counter)) {
+  if (shaft_.moved_from(counter)) {
     correct_saved_position();
-    fail_with_stop(*activity, error(Reason::moving, "the axis moved after it had reached home",
-                                    "check terminals, and other masters on the bus; home again"));
+    fail_with_stop(*activity, context_.error(Reason::moving, "the axis moved after it had reached home",
+                                             "check terminals, and other masters on the bus; home again"));
     co_return;
   }
-  tracker_.declare(offset, PositionTrust::homed);
+  shaft_.tracker().declare(offset, PositionTrust::homed);
   finish(*activity, [](CommandRecord& command) { command.done(); });
 }
 
 /// The drive would search for an edge that is behind it.
 Error Axis::reached_switch() const {
-  auto cause = error(Reason::limit_switch,
-                     fmt::format("the {} switch became active before homing could start", homing_switch()),
-                     "home again: it is left first then");
+  auto cause = context_.error(
+      Reason::limit_switch,
+      fmt::format("the {} switch became active before homing could start", context_.homing_switch()),
+      "home again: it is left first then");
   cause.outcome = Outcome::not_executed;
   return cause;
 }
@@ -105,10 +90,10 @@ Error Axis::reached_switch() const {
 /// Where the drive put its counter at home: a measured one only wavers about it. Which of the two it is after
 /// a compensation is not said (7.5).
 std::int64_t Axis::counter_at_home() const {
-  const auto measured = tracker_.counter();
-  const auto turns = measured - sample_->position_pulses;
-  const auto home = turns, compensated = turns + scale_.to_pulses(settings_.homing->offset);
-  const bool at_home = !moved_from(home), at_compensated = !moved_from(compensated);
+  const auto measured = shaft_.tracker().counter();
+  const auto turns = measured - shaft_.sample()->position_pulses;
+  const auto home = turns, compensated = turns + context_.scale.to_pulses(context_.settings.homing->offset);
+  const bool at_home = !shaft_.moved_from(home), at_compensated = !shaft_.moved_from(compensated);
   if (home != compensated && at_home && at_compensated) return measured;  // either may be meant
   if (at_home) return home;
   return at_compensated ? compensated : measured;
@@ -117,15 +102,18 @@ std::int64_t Axis::counter_at_home() const {
 /// The drive searches for the rising edge of the switch; on an active switch there is none. A bounded move
 /// against the search direction leaves it.
 Task<bool> Axis::back_off(ActivityPtr activity) {
-  const auto method = settings_.homing->method;
+  const auto method = context_.settings.homing->method;
   const bool search_positive =
       method == HomingMethod::home_positive || method == HomingMethod::positive_limit;
-  const auto distance = *settings_.homing->backoff * (search_positive ? -1 : 1);
-  const auto velocity = std::max(settings_.homing->search_velocity, planner_.minimum_velocity());
-  auto plan = planner_.profile(velocity, {.acceleration_time = settings_.homing->acceleration_time});
+  const auto distance = *context_.settings.homing->backoff * (search_positive ? -1 : 1);
+  const auto velocity =
+      std::max(context_.settings.homing->search_velocity, context_.planner.minimum_velocity());
+  auto plan =
+      context_.planner.profile(velocity, {.acceleration_time = context_.settings.homing->acceleration_time});
   if (plan) {
     // Away from an active switch is right, wherever the software limits are.
-    plan = planner_.aimed(*std::move(plan), tracker_.plan_relative(distance), tracker_);
+    plan =
+        context_.planner.aimed(*std::move(plan), shaft_.tracker().plan_relative(distance), shaft_.tracker());
   }
   if (!plan) {
     finish(*activity, [&](CommandRecord& command) { command.error(plan.error()); });
@@ -133,32 +121,33 @@ Task<bool> Axis::back_off(ActivityPtr activity) {
   }
   activity->plan = *plan;
   if (!co_await positioned(activity)) co_return false;
-  tracker_.forget_base();
-  if (!on_homing_switch()) co_return true;
+  shaft_.tracker().forget_base();
+  if (!shaft_.on_homing_switch()) co_return true;
   finish(*activity, [this](CommandRecord& command) {
-    command.error(error(Reason::limit_switch,
-                        fmt::format("the {} switch is still active after backing off", homing_switch()),
-                        "check the switch, or configure a longer backoff"));
+    command.error(context_.error(
+        Reason::limit_switch,
+        fmt::format("the {} switch is still active after backing off", context_.homing_switch()),
+        "check the switch, or configure a longer backoff"));
   });
   co_return false;
 }
 
 HomingMachine Axis::followed_homing(TimePoint since, bool homed_before) const {
-  const auto& homing = *settings_.homing;
+  const auto& homing = *context_.settings.homing;
   const auto fastest =  // pulses per second
-      std::max(std::abs(scale_.velocity_to_rpm(homing.velocity)),
-               std::abs(scale_.velocity_to_rpm(homing.search_velocity))) /
-      60 * static_cast<double>(settings_.scale.pulses_per_revolution);
+      std::max(std::abs(context_.scale.velocity_to_rpm(homing.velocity)),
+               std::abs(context_.scale.velocity_to_rpm(homing.search_velocity))) /
+      60 * static_cast<double>(context_.settings.scale.pulses_per_revolution);
   return {{.since = since,
            .timeout = homing.timeout,
            .homed_before = homed_before,
-           .offset_pulses = scale_.to_pulses(homing.offset),
-           .window = drive_->position_window(),
+           .offset_pulses = context_.scale.to_pulses(homing.offset),
+           .window = context_.drive->position_window(),
            .fastest = fastest,
            .max_travel = homing.max_travel,
-           .origin = tracker_.counter(),
-           .asked_at = sample_->asked_at},
-          scale_};
+           .origin = shaft_.tracker().counter(),
+           .asked_at = shaft_.sample()->asked_at},
+          context_.scale};
 }
 
 /// True: the drive reports home. False: the activity has ended otherwise.
@@ -166,11 +155,13 @@ Task<bool> Axis::follow_homing(ActivityPtr activity, TimePoint since, bool homed
   using State = HomingMachine::State;
   auto homing = followed_homing(since, homed_before);
   for (;;) {
-    co_await sampled_.wait_until(std::max(homing.latest(), env_.clock->now() + milliseconds(1)));
+    co_await shaft_.sampled().wait_until(
+        std::max(homing.latest(), context_.env.clock->now() + milliseconds(1)));
     if (!current(*activity)) co_return false;
-    const bool held_up = input_active("stop") || input_active("quick_stop");
-    const auto state = homing.look({.sample = *sample_, .counter = tracker_.counter(), .held_up = held_up},
-                                   env_.clock->now());
+    const bool held_up = shaft_.input_active("stop") || shaft_.input_active("quick_stop");
+    const auto state =
+        homing.look({.sample = *shaft_.sample(), .counter = shaft_.tracker().counter(), .held_up = held_up},
+                    context_.env.clock->now());
     if (state == State::home) co_return true;
     if (state <= State::settling) continue;
     fail_with_stop(*activity, not_homed(state));
@@ -182,19 +173,20 @@ Task<bool> Axis::follow_homing(ActivityPtr activity, TimePoint since, bool homed
 Error Axis::not_homed(HomingMachine::State state) const {
   switch (state) {
     case HomingMachine::State::did_not_start:
-      return error(Reason::did_not_start, "the drive accepted the homing command but does not home",
-                   "check enable, alarm and terminals");
+      return context_.error(Reason::did_not_start, "the drive accepted the homing command but does not home",
+                            "check enable, alarm and terminals");
     case HomingMachine::State::too_far:
-      return error(Reason::not_reached,
-                   fmt::format("no switch within max_travel of {} {}; it is being stopped",
-                               settings_.homing->max_travel.value_or(0), settings_.scale.unit),
-                   "check the switch and the homing direction");
+      return context_.error(
+          Reason::not_reached,
+          fmt::format("no switch within max_travel of {} {}; it is being stopped",
+                      context_.settings.homing->max_travel.value_or(0), context_.settings.scale.unit),
+          "check the switch and the homing direction");
     case HomingMachine::State::took_too_long:
-      return error(Reason::took_too_long, "no switch was found in time; it is being stopped",
-                   "check the switch, or raise homing: { timeout: ... }");
+      return context_.error(Reason::took_too_long, "no switch was found in time; it is being stopped",
+                            "check the switch, or raise homing: { timeout: ... }");
     default:
-      return error(Reason::not_reached, "homing ended without reaching home",
-                   "check the switch, limit and stop terminals");
+      return context_.error(Reason::not_reached, "homing ended without reaching home",
+                            "check the switch, limit and stop terminals");
   }
 }
 

@@ -27,18 +27,19 @@ bool moves(CommandKind kind) {
 
 /// What the run before this one left: a drive that may run, and outcomes that nobody has looked at (M4).
 void Axis::take_over() {
-  earlier_.take_over(env_.book->take_unsettled(settings_.name), env_.clock->now() + settling_limit);
+  earlier_.take_over(context_.env.book->take_unsettled(context_.settings.name),
+                     context_.env.clock->now() + settling_limit);
   for (const auto& earlier : earlier_.commands()) {
     const auto& command = earlier.command->value();
-    log_about_axis(spdlog::level::warn, LogKind::unknown_outcome, settings_,
+    log_about_axis(spdlog::level::warn, LogKind::unknown_outcome, context_.settings,
                    fmt::format("{}: the daemon ended while {} {} was being executed; asking the drive",
-                               settings_.name, to_string(command.kind), command.id),
+                               context_.settings.name, to_string(command.kind), command.id),
                    command.id);
     if (moves(command.kind)) owe_stop_of_motion();
     if (command.kind == CommandKind::home) earlier_.doubt();
   }
-  if (auto cause = env_.book->take_unknown_outcome(settings_.name)) {
-    log_about_axis(spdlog::level::err, LogKind::unknown_outcome, settings_, to_string(*cause));
+  if (auto cause = context_.env.book->take_unknown_outcome(context_.settings.name)) {
+    log_about_axis(spdlog::level::err, LogKind::unknown_outcome, context_.settings, to_string(*cause));
     fault_ = std::move(cause);
     owe_stop_of_motion();
   }
@@ -56,22 +57,23 @@ Task<Result<void>> Axis::settle_earlier() {
   if (!earlier_.open()) co_return Result<void>{};
   bool continuous = false;
   if (const auto& marks = earlier_.commands().back().note.marks; !marks.empty()) {
-    drive_->expect_marks(marks);
-    const auto proof = co_await drive_->check_continuity(TransactionClass::parameters);
+    context_.drive->expect_marks(marks);
+    const auto proof = co_await context_.drive->check_continuity(TransactionClass::parameters);
     if (!proof && proof.error().reason != Reason::rebooted) co_return proof;
     continuous = proof.has_value();
     if (!continuous) power_.restarted();
-    if (!continuous && env_.persistence != nullptr) forget_position(*env_.persistence, settings_.name, true);
+    if (!continuous && context_.env.persistence != nullptr)
+      forget_position(*context_.env.persistence, context_.settings.name, true);
   }
   // The last frame of the run before may have gone out just now.
-  co_await sleep_until(env_.executor, *env_.clock, env_.clock->now() + start_window);
-  const auto sample = co_await drive_->read_state(TransactionClass::idle_state);
+  co_await sleep_until(context_.env.executor, *context_.env.clock, context_.env.clock->now() + start_window);
+  const auto sample = co_await context_.drive->read_state(TransactionClass::idle_state);
   if (!sample) co_return fail(sample.error());
   on_sample(*sample);
-  if (life_.ends()) co_return fail(error(Reason::cancelled, "the daemon ends"));
-  if (found_in_motion()) {
+  if (life_.ends()) co_return fail(context_.error(Reason::cancelled, "the daemon ends"));
+  if (shaft_.found_in_motion()) {
     owe_stop_of_motion();
-    co_return fail(error(Reason::moving, "it began to move; stopping it", "wait"));
+    co_return fail(context_.error(Reason::moving, "it began to move; stopping it", "wait"));
   }
   for (const auto& earlier : earlier_.commands()) settle_as(earlier, continuous);
   earlier_.drop_ended();
@@ -80,7 +82,7 @@ Task<Result<void>> Axis::settle_earlier() {
 
 Error Axis::earlier_error(const Unsettled& earlier, std::string_view what, Outcome outcome) const {
   const auto& command = earlier.command->value();
-  auto cause = error(
+  auto cause = context_.error(
       Reason::cancelled,
       fmt::format("the daemon was restarted while {} was being executed: {}", to_string(command.kind), what),
       outcome == Outcome::not_executed ? "send a new request" : "look at the machine");
@@ -102,15 +104,17 @@ void Axis::settle_as(const Unsettled& earlier, bool continuous) {
   if (kind == CommandKind::reset)
     return command.abort(earlier_error(earlier, "it moves nothing, so reset again", Outcome::unknown));
   if (kind == CommandKind::enable) {
-    if (earlier.tellable && sample_->enabled) return command.done();
-    return command.abort(earlier_error(
-        earlier, sample_->enabled ? "the power stage is on" : "the power stage is off", Outcome::unknown));
+    if (earlier.tellable && shaft_.sample()->enabled) return command.done();
+    return command.abort(
+        earlier_error(earlier, shaft_.sample()->enabled ? "the power stage is on" : "the power stage is off",
+                      Outcome::unknown));
   }
   if (!earlier.tellable)
     return settle_as_unknown(earlier,
                              "the command journal was damaged, and does not tell what came after it");
-  const auto at = tracker_.counter();
-  switch (settle(kind, earlier.note, sample_->position_pulses, continuous, drive_->position_window())) {
+  const auto at = shaft_.tracker().counter();
+  switch (settle(kind, earlier.note, shaft_.sample()->position_pulses, continuous,
+                 context_.drive->position_window())) {
     case Settlement::done:
       return command.done();
     case Settlement::not_executed:
@@ -129,8 +133,8 @@ void Axis::settle_as(const Unsettled& earlier, bool continuous) {
 void Axis::settle_positions_set() {
   for (const auto& earlier : earlier_.take_all()) {
     const auto position = earlier.command->value().asked.position.value_or(0);
-    const bool kept = tracker_.trust() == PositionTrust::restored;
-    if (kept && earlier.tellable && tracker_.offset_for(position) == tracker_.offset())
+    const bool kept = shaft_.tracker().trust() == PositionTrust::restored;
+    if (kept && earlier.tellable && shaft_.tracker().offset_for(position) == shaft_.tracker().offset())
       earlier.command->done();
     else
       earlier.command->abort(
@@ -146,13 +150,15 @@ void Axis::give_up_settling() {
 
 /// By what a restart tells whether the activity's start was executed.
 SendingNote Axis::note_of(const Activity& activity, std::vector<ContinuityMark> marks) const {
-  const auto raw = static_cast<std::int32_t>(tracker_.counter());
-  SendingNote note{.start_pulses = raw, .tolerance_pulses = target_tolerance(), .marks = std::move(marks)};
+  const auto raw = static_cast<std::int32_t>(shaft_.tracker().counter());
+  SendingNote note{
+      .start_pulses = raw, .tolerance_pulses = context_.target_tolerance(), .marks = std::move(marks)};
   if (activity.command->value().kind == CommandKind::home) {
     // Which way a compensation counts is the drive's business: one of both is enough to be careful.
-    const auto offset = scale_.to_pulses(settings_.homing ? settings_.homing->offset : 0);
+    const auto offset =
+        context_.scale.to_pulses(context_.settings.homing ? context_.settings.homing->offset : 0);
     note.target_pulses = static_cast<std::int32_t>((raw < 0) == (offset < 0) ? offset : -offset);
-    if (const auto mark = drive_->continuity_mark(); mark && note.marks.empty()) note.marks = {*mark};
+    if (const auto mark = context_.drive->continuity_mark(); mark && note.marks.empty()) note.marks = {*mark};
     return note;
   }
   if (activity.plan.target) note.target_pulses = static_cast<std::int32_t>(activity.plan.target->counter);
@@ -164,42 +170,44 @@ SendingNote Axis::note_of(const Activity& activity, std::vector<ContinuityMark> 
 Task<bool> Axis::noted(ActivityPtr activity, SendingNote note) {
   if (!activity->start.note()) co_return true;
   // Shared: the answer may come after this sequence was left.
-  auto answer = std::make_shared<Promise<Result<void>>>(env_.executor, *env_.clock);
-  env_.book->sending(activity->command, std::move(note),
-                     [answer](Result<void> result) { answer->set(std::move(result)); });
+  auto answer = std::make_shared<Promise<Result<void>>>(context_.env.executor, *context_.env.clock);
+  context_.env.book->sending(activity->command, std::move(note),
+                             [answer](Result<void> result) { answer->set(std::move(result)); });
   const auto durable = co_await answer->get();
   if (!current(*activity)) co_return false;
   activity->start.noted();
   if (durable) co_return true;
-  auto cause =
-      error(durable.error().reason, "nothing was sent: " + durable.error().message, durable.error().remedy);
+  auto cause = context_.error(durable.error().reason, "nothing was sent: " + durable.error().message,
+                              durable.error().remedy);
   cause.where.native_code = durable.error().where.native_code;
   finish(*activity, [&](CommandRecord& command) { command.error(std::move(cause)); });
   co_return false;
 }
 
 Result<void> Axis::check_journal() const {
-  const auto trouble = env_.book->trouble();
+  const auto trouble = context_.env.book->trouble();
   if (!trouble) return {};
-  auto cause = error(Reason::storage, "nothing new is started: " + trouble->message, trouble->remedy);
+  auto cause =
+      context_.error(Reason::storage, "nothing new is started: " + trouble->message, trouble->remedy);
   cause.where.native_code = trouble->where.native_code;
   return fail(std::move(cause));
 }
 
 /// Returns once a restart finds no position for the axis.
 Task<Result<void>> Axis::forget_saved_position() {
-  if (env_.persistence == nullptr) co_return Result<void>{};
-  auto answer = std::make_shared<Promise<Result<void>>>(env_.executor, *env_.clock);
-  env_.persistence->forget_offset(settings_.name,
-                                  [answer](Result<void> result) { answer->set(std::move(result)); });
+  if (context_.env.persistence == nullptr) co_return Result<void>{};
+  auto answer = std::make_shared<Promise<Result<void>>>(context_.env.executor, *context_.env.clock);
+  context_.env.persistence->forget_offset(context_.settings.name,
+                                          [answer](Result<void> result) { answer->set(std::move(result)); });
   co_return co_await answer->get();
 }
 
 /// What was saved for a command that then came to nothing: the record says again what the axis goes by.
 void Axis::correct_saved_position() {
-  if (tracker_.trust() != PositionTrust::unknown) return remember_position();
-  if (env_.persistence != nullptr)
-    forget_position(*env_.persistence, settings_.name, power_.state() == PowerMachine::State::restarted);
+  if (shaft_.tracker().trust() != PositionTrust::unknown) return remember_position();
+  if (context_.env.persistence != nullptr)
+    forget_position(*context_.env.persistence, context_.settings.name,
+                    power_.state() == PowerMachine::State::restarted);
 }
 
 }  // namespace axisd

@@ -46,19 +46,19 @@ std::string_view to_string(StartMachine::State waits) {
 /// It arrived longer ago than it may wait, or its caller has given up. What is buffered may wait.
 bool Axis::too_late(const CommandOptions& options) const {
   if (options.buffer_mode == BufferMode::buffered && (buffer_.starts() || activity_)) return false;
-  const auto now = env_.clock->now();
+  const auto now = context_.env.clock->now();
   return now > options.call_deadline ||
-         (options.arrived != TimePoint{} && now > options.arrived + settings_.start_within);
+         (options.arrived != TimePoint{} && now > options.arrived + context_.settings.start_within);
 }
 
 void Axis::bound_start(const ActivityPtr& activity, bool waited, bool halting) {
   if (halting) activity->start.wait_for_halt();
   if (may_be_late(activity->command->value().kind)) return;
   const auto& options = activity->options;
-  auto since = env_.clock->now();
+  auto since = context_.env.clock->now();
   if (!waited && options.arrived != TimePoint{}) since = options.arrived;
-  auto latest = since + settings_.start_within;
-  if (halting) latest += stop_.deceleration() + settings_.stop_margin;
+  auto latest = since + context_.settings.start_within;
+  if (halting) latest += stop_.deceleration() + context_.settings.stop_margin;
   if (halting && stop_.unseen_start().may_begin()) latest += start_window;  // so long its rest proves nothing
   if (!waited) latest = std::min(latest, options.call_deadline);
   start_by(activity, since, latest);
@@ -68,7 +68,7 @@ void Axis::bound_start(const ActivityPtr& activity, bool waited, bool halting) {
 void Axis::start_by(const ActivityPtr& activity, TimePoint since, TimePoint latest) {
   activity->waits_since = since;
   activity->start_by = latest;
-  activity->late = env_.clock->call_at(latest + Duration(1), [this, weak = std::weak_ptr(activity)] {
+  activity->late = context_.env.clock->call_at(latest + Duration(1), [this, weak = std::weak_ptr(activity)] {
     if (const auto waiting = weak.lock()) end_late(*waiting);
   });
 }
@@ -85,19 +85,19 @@ void Axis::end_late(Activity& activity) {
 
 /// Nothing was sent for it, as it would have been too late. `cause`: where that was found.
 Error Axis::late(const Activity& activity, Error cause) const {
-  const auto waited = env_.clock->now() - activity.waits_since;
+  const auto waited = context_.env.clock->now() - activity.waits_since;
   if (activity.start.state() == StartMachine::State::set_down)
-    return error(Reason::expired,
-                 fmt::format("it was prepared for {:.3f} s, and was not started", in_seconds(waited)),
-                 "prepare it again, and start it in time");
-  auto told =
-      error(Reason::expired,
-            fmt::format("too late to start: it waited {:.3f} s {}, at most {:.3f} s are allowed "
-                        "(start_within{})",
-                        in_seconds(waited), to_string(activity.start.state()),
-                        in_seconds(activity.start_by - activity.waits_since),
-                        activity.start_by == activity.options.call_deadline ? ", the call's deadline" : ""),
-            "repeat it, if it is still wanted; if it is often so, look at the load of disk and line");
+    return context_.error(
+        Reason::expired, fmt::format("it was prepared for {:.3f} s, and was not started", in_seconds(waited)),
+        "prepare it again, and start it in time");
+  auto told = context_.error(
+      Reason::expired,
+      fmt::format("too late to start: it waited {:.3f} s {}, at most {:.3f} s are allowed "
+                  "(start_within{})",
+                  in_seconds(waited), to_string(activity.start.state()),
+                  in_seconds(activity.start_by - activity.waits_since),
+                  activity.start_by == activity.options.call_deadline ? ", the call's deadline" : ""),
+      "repeat it, if it is still wanted; if it is often so, look at the load of disk and line");
   if (!cause.where.bus.empty()) told.where = std::move(cause.where);
   return told;
 }

@@ -14,7 +14,7 @@
 namespace axisd {
 
 bool Axis::current(const Activity& activity) const {
-  return activity_.get() == &activity && gate_->epoch() == activity.epoch;
+  return activity_.get() == &activity && context_.gate->epoch() == activity.epoch;
 }
 
 MotionGuard Axis::guard(const Activity& activity) const {
@@ -22,7 +22,7 @@ MotionGuard Axis::guard(const Activity& activity) const {
   if (activity.lease_over) token = MotionGuard::lease_is_over;
   if (activity.command->value().kind == CommandKind::disable) token = MotionGuard::needs_no_lease;
   // What nobody holds any more does not start, either.
-  return {.gate = gate_,
+  return {.gate = context_.gate,
           .epoch = activity.epoch,
           .fencing_token = token,
           .not_after = std::min({activity.options.not_after, activity.start_by,
@@ -79,7 +79,7 @@ void Axis::abort_at_rest(Activity& activity, Error cause) {
 void Axis::enter_error_stop(const Error& cause) {
   revoke_motion();
   if (!fault_ || fault_->reason != cause.reason || fault_->where.native_code != cause.where.native_code) {
-    log_about_axis(spdlog::level::err, LogKind::axis_fault, settings_, to_string(cause));
+    log_about_axis(spdlog::level::err, LogKind::axis_fault, context_.settings, to_string(cause));
     fault_ = cause;
   }
   if (auto activity = take_activity()) {
@@ -87,18 +87,19 @@ void Axis::enter_error_stop(const Error& cause) {
     activity->command->error(cause);
     drop_buffer(cause);
   }
-  tracker_.forget_base();
+  shaft_.tracker().forget_base();
 }
 
 /// Waits for a sample whose request went out at `since` or later.
 Task<Result<DriveSample>> Axis::sample_after(TimePoint since, Duration patience) {
-  const auto deadline = env_.clock->now() + patience;
+  const auto deadline = context_.env.clock->now() + patience;
   wake();
-  while (env_.clock->now() < deadline && !link_.offline()) {
-    if (sample_ && sample_->asked_at >= since) co_return *sample_;
-    co_await sampled_.wait_until(deadline);
+  while (context_.env.clock->now() < deadline && !link_.offline()) {
+    if (shaft_.sample() && shaft_.sample()->asked_at >= since) co_return *shaft_.sample();
+    co_await shaft_.sampled().wait_until(deadline);
   }
-  co_return fail(error(Reason::no_reply, "the drive could not be read back", "check power and wiring"));
+  co_return fail(
+      context_.error(Reason::no_reply, "the drive could not be read back", "check power and wiring"));
 }
 
 /// Lets a halt in progress end. False: no longer current.
@@ -115,24 +116,20 @@ Task<bool> Axis::reach_standstill(ActivityPtr activity) {
 
 Task<> Axis::run_move(ActivityPtr activity) {
   if (!co_await positioned(activity)) co_return;
-  tracker_.reached(*activity->plan.target, drive_->position_window());
+  shaft_.tracker().reached(*activity->plan.target, context_.drive->position_window());
   remember_position();
   finish(*activity, [](CommandRecord& command) { command.done(); });
-}
-
-Error Axis::moved_before_start() const {
-  return error(Reason::moving, "the drive began to move before the start",
-               "check its terminals, and other masters on the bus");
 }
 
 /// What was true at its acceptance, or before the disk was waited for, may have changed. False: the activity
 /// has ended, and nothing was sent.
 bool Axis::may_start(Activity& activity) {
-  const bool moved = found_in_motion();
-  if (!moved && (!activity.plan.trusted || tracker_.trust() != PositionTrust::unknown)) return true;
-  auto cause = moved ? moved_before_start()
-                     : error(Reason::not_trusted, "the position was lost before the move could start",
-                             "home the axis, or set its position");
+  const bool moved = shaft_.found_in_motion();
+  if (!moved && (!activity.plan.trusted || shaft_.tracker().trust() != PositionTrust::unknown)) return true;
+  auto cause = moved
+                   ? context_.moved_before_start()
+                   : context_.error(Reason::not_trusted, "the position was lost before the move could start",
+                                    "home the axis, or set its position");
   tell_part(activity, cause);
   finish(activity, [&](CommandRecord& command) { command.error(std::move(cause)); });
   return false;
@@ -141,13 +138,13 @@ bool Axis::may_start(Activity& activity) {
 /// Lets others start that asked before; then nobody else does until the turn is left (M6). False: the
 /// activity has ended, and nothing was sent.
 Task<bool> Axis::take_turn(ActivityPtr activity) {
-  auto* turns = env_.bus->start_turns();
+  auto* turns = context_.env.bus->start_turns();
   if (turns == nullptr) co_return true;
   activity->start.queue();
   if (!activity->turn) activity->turn = turns->announce();
   co_await turns->take(activity->turn);
   if (!current(*activity)) co_return false;
-  had_turn_ = env_.clock->now();
+  had_turn_ = context_.env.clock->now();
   activity->start.has_turn();
   co_return true;
 }
@@ -155,44 +152,44 @@ Task<bool> Axis::take_turn(ActivityPtr activity) {
 /// One positioning motion to the plan's target. False: the activity has ended.
 Task<bool> Axis::positioned(ActivityPtr activity) {
   if (!co_await reach_standstill(activity)) co_return false;
-  auto result = co_await look(settings_.reboot_guard);
+  auto result = co_await look(context_.settings.reboot_guard);
   if (!current(*activity) || !may_start(*activity)) co_return false;
   if (result) result = aim(*activity);
   if (result) result = co_await make_room(activity);
   if (!current(*activity)) co_return false;
   if (result &&
-      !co_await noted(activity, note_of(*activity, drive_->marks_until(profile_of(activity->plan)))))
+      !co_await noted(activity, note_of(*activity, context_.drive->marks_until(profile_of(activity->plan)))))
     co_return false;
   std::int64_t base = 0;
   bool there = false;
   {
     if (result && !co_await take_turn(activity)) co_return false;
     const Chain chain(*this);
-    if (result) result = co_await look(settings_.reboot_guard);
+    if (result) result = co_await look(context_.settings.reboot_guard);
     if (!current(*activity) || !may_start(*activity)) co_return false;
     if (result) result = check_way(*activity);
-    base = tracker_.counter();
+    base = shaft_.tracker().counter();
     const auto& target = *activity->plan.target;
-    there = result && tracker_.rests_at(target);
+    there = result && shaft_.tracker().rests_at(target);
     if (result && !there) {
-      activity->plan.predicted = planner_.duration(activity->plan, target.counter - base);
-      if (may_move_by_itself()) {
+      activity->plan.predicted = context_.planner.duration(activity->plan, target.counter - base);
+      if (context_.may_move_by_itself()) {
         auto triggered = co_await start_unmoved(activity);
         if (!triggered) {
           stop_.unseen_start().not_sent(activity->number);
           co_return false;
         }
         result = *std::move(triggered);
-        base = tracker_.counter();
+        base = shaft_.tracker().counter();
       } else {
-        activity->number = stop_.unseen_start().sending(base, env_.clock->now());
-        result = co_await drive_->start_move(profile_of(activity->plan), guard(*activity));
+        activity->number = stop_.unseen_start().sending(base, context_.env.clock->now());
+        result = co_await context_.drive->start_move(profile_of(activity->plan), guard(*activity));
       }
-      if (result || result.error().outcome == Outcome::unknown) tracker_.forget_base();
+      if (result || result.error().outcome == Outcome::unknown) shaft_.tracker().forget_base();
     }
   }
   result && !there ? activity->turn.done() : activity->turn.leave();
-  const auto since = env_.clock->now();
+  const auto since = context_.env.clock->now();
   if (there) {  // nothing to do, and nothing is sent
     activity->command->activate();
     co_return co_await is_no_reboot(activity) && co_await still_there(activity);
@@ -201,45 +198,24 @@ Task<bool> Axis::positioned(ActivityPtr activity) {
   co_return (co_await arrived(activity, base, since)).has_value();
 }
 
-bool Axis::is_at(const PositionTracker::Target& target) const {
-  return std::abs(tracker_.counter() - target.counter) <= target_tolerance();
-}
-
-bool Axis::is_near(const PositionTracker::Target& target) const {
-  constexpr std::int64_t noise_counts = 2;
-  const auto wavering = std::max<std::int64_t>(drive_->position_window() / 2, noise_counts);
-  return std::abs(tracker_.counter() - target.counter) <= target_tolerance() + wavering;
-}
-
-Duration Axis::settling() const {
-  return drive_->position_window() > 0 ? Duration(milliseconds(300)) : Duration{};
-}
-
-std::int64_t Axis::target_tolerance() const {
-  return std::max<std::int64_t>(drive_->position_window(), std::llround(settings_.position_tolerance *
-                                                                        std::abs(scale_.pulses_per_unit())));
-}
-
-bool Axis::moved_from(std::int64_t counter) const {
-  return std::abs(tracker_.counter() - counter) > drive_->position_window();
-}
-
 Task<> Axis::run_velocity(ActivityPtr activity) {
   if (!activity->plan.endless) {
     // Without a known position a jog is bounded by its travel alone: from where the shaft is (M16).
-    if (activity->plan.target->distance) tracker_.forget_base();
+    if (activity->plan.target->distance) shaft_.tracker().forget_base();
     if (!co_await positioned(activity)) co_return;
-    tracker_.reached(*activity->plan.target, drive_->position_window());
+    shaft_.tracker().reached(*activity->plan.target, context_.drive->position_window());
     remember_position();
     const bool jog = activity->command->value().kind == CommandKind::jog;
-    const auto& limits = settings_.limits;
-    const auto left = activity->plan.positive ? *limits.position_maximum - tracker_.position()
-                                              : tracker_.position() - *limits.position_minimum;
+    const auto& limits = context_.settings.limits;
+    const auto left = activity->plan.positive ? *limits.position_maximum - shaft_.tracker().position()
+                                              : shaft_.tracker().position() - *limits.position_minimum;
     const bool short_of_it =
-        scale_.to_pulses(left) * (scale_.pulses_per_unit() < 0 ? -1 : 1) > target_tolerance() + 1;
-    auto cause = short_of_it ? error(Reason::out_of_range,
+        context_.scale.to_pulses(left) * (context_.scale.pulses_per_unit() < 0 ? -1 : 1) >
+        context_.target_tolerance() + 1;
+    auto cause =
+        short_of_it ? context_.error(Reason::out_of_range,
                                      "reached the end of the drive's longest single motion", "start it again")
-                             : error(Reason::soft_limit, "reached the software limit", "move the other way");
+                    : context_.error(Reason::soft_limit, "reached the software limit", "move the other way");
     finish(*activity,
            [&](CommandRecord& command) { jog ? command.done() : command.abort(std::move(cause)); });
     co_return;
@@ -249,22 +225,22 @@ Task<> Axis::run_velocity(ActivityPtr activity) {
                                 .start_rpm = activity->plan.start_rpm,
                                 .acceleration_time = activity->plan.acceleration_time,
                                 .deceleration_time = activity->plan.deceleration_time};
-  if (!co_await noted(activity, note_of(*activity, drive_->marks_until(profile)))) co_return;
+  if (!co_await noted(activity, note_of(*activity, context_.drive->marks_until(profile)))) co_return;
   Result<void> result;
   std::int64_t base = 0;
   {
     if (!co_await take_turn(activity)) co_return;
     const Chain chain(*this);
-    if (activity->turn) result = co_await look(settings_.reboot_guard);  // it may have waited long
+    if (activity->turn) result = co_await look(context_.settings.reboot_guard);  // it may have waited long
     if (!current(*activity) || !may_start(*activity)) co_return;
-    base = tracker_.counter();
+    base = shaft_.tracker().counter();
     if (result) {
-      activity->number = stop_.unseen_start().sending(base, env_.clock->now());
-      result = co_await drive_->start_velocity(profile, guard(*activity));
+      activity->number = stop_.unseen_start().sending(base, context_.env.clock->now());
+      result = co_await context_.drive->start_velocity(profile, guard(*activity));
     }
   }
   result ? activity->turn.done() : activity->turn.leave();
-  const auto since = env_.clock->now();
+  const auto since = context_.env.clock->now();
   if (!co_await started(activity, std::move(result), base, since)) co_return;
   activity->motion = followed(activity->plan, base, since);
   co_await follow(activity, base, since);
@@ -272,7 +248,8 @@ Task<> Axis::run_velocity(ActivityPtr activity) {
 
 /// What the gate no longer let out was overtaken by time or by another client: nobody's error.
 void Axis::end_unsent(Activity& activity, Error cause) {
-  if (cause.reason == Reason::expired && env_.clock->now() > activity.start_by) cause = late(activity, cause);
+  if (cause.reason == Reason::expired && context_.env.clock->now() > activity.start_by)
+    cause = late(activity, cause);
   const bool aborted = cause.reason == Reason::expired || cause.reason == Reason::lease_lost;
   finish(activity, [&](CommandRecord& command) { aborted ? command.abort(cause) : command.error(cause); });
 }
@@ -290,7 +267,7 @@ Task<bool> Axis::started(ActivityPtr activity, Result<void> result, std::int64_t
   watch_speed(SpeedWatch::Event::begun);
   if (result) {
     // A proof was part of it, no longer than `reboot_guard` before the trigger; that has its reply since.
-    continuity_.proven(drive_->proven_at().value_or(since - 2 * settings_.reboot_guard));
+    continuity_.proven(context_.drive->proven_at().value_or(since - 2 * context_.settings.reboot_guard));
     activity->command->activate();
     publish();
     co_return true;

@@ -24,18 +24,18 @@ Task<> Axis::poll() {
       co_await wake_.wait_until(pace_.quiet_until());
       continue;
     }
-    const auto began = env_.clock->now();
+    const auto began = context_.env.clock->now();
     if (!co_await poll_once(polling)) co_return;
     if (polling.woken || polling.failures > 0) continue;  // the bus's own timeouts pace the repetition
     if (works()) {
       // Whoever waits for this sample goes first: it may be the last one that is wanted.
-      co_await let_others_run(env_.executor, *env_.clock);
+      co_await let_others_run(context_.env.executor, *context_.env.clock);
       if (!link_.online() || link_.bus_loss() || chains_ > 0) continue;
     }
     // An axis that indexes rests for a moment only, just when its end was seen.
     look_for_drift();
     // A command that begins to wait for its turn meanwhile puts it off.
-    while (next_poll(polling, began) > env_.clock->now())
+    while (next_poll(polling, began) > context_.env.clock->now())
       if (co_await wake_.wait_until(next_poll(polling, began))) break;
   }
 }
@@ -43,25 +43,25 @@ Task<> Axis::poll() {
 /// When it is read next after a reading that was wanted at `began`.
 TimePoint Axis::next_poll(const Polling& polling, TimePoint began) const {
   // At rest it counts from the reading itself: on a full line that came long after it was wanted.
-  const bool waited = !works() && env_.bus->start_turns() != nullptr;
-  const auto asked = sample_ && (polling.repeated || waited) ? sample_->asked_at : began;
+  const bool waited = !works() && context_.env.bus->start_turns() != nullptr;
+  const auto asked = shaft_.sample() && (polling.repeated || waited) ? shaft_.sample()->asked_at : began;
   return std::min(pace_.next(asked, works()), continuity_.latest(works()));
 }
 
 /// What was started is not read before. Where starts need no turns a reading costs no other axis anything.
 void Axis::keep_quiet(TimePoint until) {
-  if (env_.bus->start_turns() != nullptr) pace_.keep_quiet(until);
+  if (context_.env.bus->start_turns() != nullptr) pace_.keep_quiet(until);
 }
 
 /// Whatever stops it is looked after at once.
 bool Axis::keeps_quiet() const {
   const bool begun = activity_ && activity_->start.has_begun();
   return begun && !stop_.under_way() && !stop_.owed() &&
-         pace_.state(env_.clock->now()) == PollPace::State::quiet;
+         pace_.state(context_.env.clock->now()) == PollPace::State::quiet;
 }
 
 void Axis::poll_for_end(TimePoint from, Duration longest) {
-  if (env_.bus->start_turns() == nullptr) return poll_fast(from, longest);
+  if (context_.env.bus->start_turns() == nullptr) return poll_fast(from, longest);
   pace_.expect_end(from, longest);
   wake();
 }
@@ -73,8 +73,8 @@ void Axis::poll_fast(TimePoint from, Duration longest) {
 
 /// The drive was not restarted since its parameters were last written.
 Task<Result<void>> Axis::prove_continuity(TransactionClass priority) {
-  auto proof = co_await drive_->check_continuity(priority);
-  if (proof) continuity_.proven(env_.clock->now());
+  auto proof = co_await context_.drive->check_continuity(priority);
+  if (proof) continuity_.proven(context_.env.clock->now());
   continuity_.fade_waits();
   co_return proof;
 }
@@ -83,7 +83,7 @@ Task<Result<void>> Axis::prove_continuity(TransactionClass priority) {
 Task<bool> Axis::poll_once(Polling& polling) {
   polling.woken = polling.repeated = false;
   Result<void> result;
-  const auto now = env_.clock->now();
+  const auto now = context_.env.clock->now();
   // Where an end is awaited the canary waits as long as it may.
   const bool urgent = pace_.is_fast(now) && works();
   using Pace = Continuity::Pace;
@@ -115,7 +115,7 @@ Task<bool> Axis::poll_once(Polling& polling) {
     polling.failures = 0;
     co_return true;
   }
-  const bool unproven = continuity_.lost(env_.clock->now());
+  const bool unproven = continuity_.lost(context_.env.clock->now());
   // It was given up, as something has begun since, or cut by a stop: its node has not failed to answer.
   polling.woken = result.error().reason == Reason::superseded;
   if (polling.woken && !unproven) co_return true;
@@ -130,16 +130,18 @@ Task<bool> Axis::poll_once(Polling& polling) {
 }
 
 Error Axis::not_heard() const {
-  return error(Reason::no_reply, "the drive was not heard for too long, and is not asked at the moment",
-               "check power, wiring, address and baud rate of the node");
+  return context_.error(Reason::no_reply,
+                        "the drive was not heard for too long, and is not asked at the moment",
+                        "check power, wiring, address and baud rate of the node");
 }
 
 /// At rest the bus reads the state again and again, and tells what is new. Nothing: the axis was woken
 /// before.
 Task<Result<std::optional<DriveSample>>> Axis::next_sample(Polling& polling) {
-  if (works()) co_return co_await drive_->read_state(TransactionClass::moving_state, pace_.awaited_from());
-  if (polling.failures > 0) co_return co_await drive_->read_state(TransactionClass::idle_state);
-  StateWatch watch{.period = settings_.poll_idle};
+  if (works())
+    co_return co_await context_.drive->read_state(TransactionClass::moving_state, pace_.awaited_from());
+  if (polling.failures > 0) co_return co_await context_.drive->read_state(TransactionClass::idle_state);
+  StateWatch watch{.period = context_.settings.poll_idle};
   watch.goes_on = [this, &polling](const DriveSample& sample) {
     const bool goes_on = seen_again(sample) && only_watches();
     polling.repeated = polling.repeated || goes_on;
@@ -147,28 +149,28 @@ Task<Result<std::optional<DriveSample>>> Axis::next_sample(Polling& polling) {
   };
   watch.proof_due = [this, &polling](TimePoint next, Duration waited) {
     continuity_.waited(waited);
-    return polling.proof_due = continuity_.due_beside(next, settings_.poll_idle);
+    return polling.proof_due = continuity_.due_beside(next, context_.settings.poll_idle);
   };
   watch.proven = [this](TimePoint at) { continuity_.proven(at); };
-  co_return co_await drive_->watch_state(std::move(watch));
+  co_return co_await context_.drive->watch_state(std::move(watch));
 }
 
 /// The drive is as it was, and nothing has changed about the axis since it was looked at with that state:
 /// then only the time at which that is known has.
 bool Axis::seen_again(const DriveSample& sample) {
   if (continuity_.forgotten(sample.asked_at)) return false;  // to be proven first
-  if (!link_.online() || revision_ != sampled_revision_ || busy() || power_.owes_release() || !sample_ ||
-      note_eeprom_writes() || shown_->link_note != drive_->link_note() ||
-      shown_->start_note != drive_->no_common_start())
+  if (!link_.online() || revision_ != sampled_revision_ || busy() || power_.owes_release() ||
+      !shaft_.sample() || note_eeprom_writes() || shown_->link_note != context_.drive->link_note() ||
+      shown_->start_note != context_.drive->no_common_start())
     return false;
-  auto known = *sample_;
+  auto known = *shaft_.sample();
   known.asked_at = sample.asked_at;
   known.measured_at = sample.measured_at;
   if (known != sample) return false;
-  sample_ = sample;
+  shaft_.take(sample);
   observed_.on_sample(sample, false);
-  shown_->sampled.set(sample.asked_at, sample.measured_at, env_.clock->wall(sample.measured_at));
-  sampled_.notify_all();
+  shown_->sampled.set(sample.asked_at, sample.measured_at, context_.env.clock->wall(sample.measured_at));
+  shaft_.sampled().notify_all();
   return true;
 }
 
@@ -179,9 +181,9 @@ bool Axis::only_watches() const {
 
 /// The poll loop has something to look at.
 void Axis::wake() {
-  env_.bus->end_repetition(settings_.node);
+  context_.env.bus->end_repetition(context_.settings.node);
   // A reading that came due since the stop began is waited for like those before.
-  if (stop_.under_way()) env_.bus->hasten(settings_.node, TransactionClass::moving_state);
+  if (stop_.under_way()) context_.env.bus->hasten(context_.settings.node, TransactionClass::moving_state);
   wake_.notify_all();
 }
 
@@ -189,12 +191,12 @@ void Axis::wake() {
 /// heard of the drive for so long.
 void Axis::watch_continuity() {
   if (!link_.online()) return;
-  const auto now = env_.clock->now();
-  if (continuity_.lost(now) && env_.bus->holds_back(settings_.node)) {
+  const auto now = context_.env.clock->now();
+  if (continuity_.lost(now) && context_.env.bus->holds_back(context_.settings.node)) {
     go_offline(not_heard());
     return;
   }
-  continuity_watch_ = env_.clock->call_at(continuity_.next_look(now), [this] { watch_continuity(); });
+  continuity_watch_ = context_.env.clock->call_at(continuity_.next_look(now), [this] { watch_continuity(); });
 }
 
 }  // namespace axisd

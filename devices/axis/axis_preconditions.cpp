@@ -31,8 +31,8 @@ std::vector<Obstacle> Axis::explain(const std::optional<Action>& action,
   Obstacles found;
   const bool never_waits = action && std::holds_alternative<DisableRequest>(*action);
   const bool has_id = !action || !options.request_id.empty();
-  const auto doubt = never_waits || !has_id ? std::nullopt : env_.book->doubt(settings_.name);
-  const bool told_behind = env_.state_unaccepted != nullptr && *env_.state_unaccepted;
+  const auto doubt = never_waits || !has_id ? std::nullopt : context_.env.book->doubt(context_.settings.name);
+  const bool told_behind = context_.env.state_unaccepted != nullptr && *context_.env.state_unaccepted;
   if (doubt && !told_behind) found.block(*doubt);
   const bool for_power = action && buffer_.empty() && waits_for_power(activity_, *action);
   if (action && (options.buffer_mode == BufferMode::buffered || for_power) && !never_waits) {
@@ -47,81 +47,79 @@ std::vector<Obstacle> Axis::explain(const std::optional<Action>& action,
   return std::move(found).all();
 }
 
-/// "axisctl enable feeder": what a person can do about it.
-std::string Axis::shell(std::string_view command, std::string_view rest) const {
-  return fmt::format("axisctl {} {}{}{}", command, settings_.name, rest.empty() ? "" : " ", rest);
-}
-
 void Axis::look_at_options(const CommandOptions& options, Obstacles& found) const {
-  if (options.not_after <= env_.clock->now())
-    found.block(
-        error(Reason::expired, "the request's validity has passed", "repeat it with a later not_after"));
+  if (options.not_after <= context_.env.clock->now())
+    found.block(context_.error(Reason::expired, "the request's validity has passed",
+                               "repeat it with a later not_after"));
   if (too_late(options))
-    found.block(error(Reason::expired,
-                      fmt::format("accepted too late: it may start within {} ms of its arrival, and no later "
-                                  "than the deadline of its call",
-                                  std::chrono::duration_cast<milliseconds>(settings_.start_within).count()),
-                      "repeat it, if it is still wanted"));
+    found.block(context_.error(
+        Reason::expired,
+        fmt::format("accepted too late: it may start within {} ms of its arrival, and no later "
+                    "than the deadline of its call",
+                    std::chrono::duration_cast<milliseconds>(context_.settings.start_within).count()),
+        "repeat it, if it is still wanted"));
   found.block_on(check_lease({.client = options.client, .lease_token = options.lease_token}));
 }
 
 /// Everybody's stop counts: each who holds has to let go (M14).
 void Axis::look_at_holds(const CommandOptions& options, Obstacles& found) const {
   if (unheld()) return;
-  const auto& holds = env_.holds->all();
-  found.block(error(Reason::stopping, "a stop is held by " + text_of(holds),
-                    how_to_release(holds, settings_.name, options.client)));
+  const auto& holds = context_.env.holds->all();
+  found.block(context_.error(Reason::stopping, "a stop is held by " + text_of(holds),
+                             how_to_release(holds, context_.settings.name, options.client)));
 }
 
 void Axis::look_at_link(Obstacles& found) const {
-  if (life_.retired()) return found.block(reloading());
+  if (life_.retired()) return found.block(context_.reloading());
   if (!link_.online() && !link_.offline()) {
-    auto cause = error(Reason::configuring, "the drive is being identified and configured", "wait");
+    auto cause = context_.error(Reason::configuring, "the drive is being identified and configured", "wait");
     if (link_.error()) {
       cause = *link_.error();
-      cause.message = fmt::format("{}: not configured: {}", settings_.name, link_.error()->message);
+      cause.message = fmt::format("{}: not configured: {}", context_.settings.name, link_.error()->message);
       const bool lasting = cause.reason == Reason::wrong_model || cause.reason == Reason::misconfigured ||
                            cause.reason == Reason::eeprom_budget;
       // What it asks for would only be refused for the same reason.
       if (cause.reason == Reason::rebooted)
-        cause.remedy =
-            fmt::format("wait until it is configured again, mostly within a second; then {}, and {}",
-                        shell("enable"), settings_.homing ? shell("home") : "set its position");
+        cause.remedy = fmt::format(
+            "wait until it is configured again, mostly within a second; then {}, and {}",
+            context_.shell("enable"), context_.settings.homing ? context_.shell("home") : "set its position");
       if (!lasting) cause.reason = Reason::configuring;
       cause.outcome = Outcome::not_sent;
     }
     found.block(std::move(cause));
   }
   if (!link_.offline()) return;
-  auto silent = error(Reason::offline, "offline", "check power and wiring");
+  auto silent = context_.error(Reason::offline, "offline", "check power and wiring");
   if (const auto& why = link_.error()) {
-    silent.message += ": " + bare_text(*why, settings_.name);
+    silent.message += ": " + bare_text(*why, context_.settings.name);
     // Whoever saw it knows best what to do: one remedy, not two.
     if (!why->remedy.empty()) silent.remedy = why->remedy;
   }
   // A port that is not open says so itself.
-  if (env_.bus->port().open) silent.remedy += "; it is retried by itself";
+  if (context_.env.bus->port().open) silent.remedy += "; it is retried by itself";
   found.block(std::move(silent));
-  if (const auto& port = env_.bus->port(); !port.open) {
-    auto cause = port.error.value_or(Error{
-        .reason = Reason::bus_down, .message = "the port is not open", .where = {.bus = settings_.bus}});
+  if (const auto& port = context_.env.bus->port(); !port.open) {
+    auto cause = port.error.value_or(Error{.reason = Reason::bus_down,
+                                           .message = "the port is not open",
+                                           .where = {.bus = context_.settings.bus}});
     if (cause.remedy.empty()) cause.remedy = "it is opened as soon as it can be";
     found.block(std::move(cause));
   }
-  if (const auto held = env_.bus->quarantined(settings_.node)) {
-    const auto now = env_.clock->now();
-    found.block(error(
+  if (const auto held = context_.env.bus->quarantined(context_.settings.node)) {
+    const auto now = context_.env.clock->now();
+    found.block(context_.error(
         Reason::no_reply,
         fmt::format(
             "node {} is in quarantine for {:.1f} s, {} requests in vain; it is asked again in {:.1f} s",
-            settings_.node, in_seconds(now - held->since), held->probes,
+            context_.settings.node, in_seconds(now - held->since), held->probes,
             in_seconds(std::max(held->next - now, Duration::zero()))),
         fmt::format("check its power, address and serial settings; look who answers: axisctl bus scan {}",
-                    settings_.bus)));
+                    context_.settings.bus)));
   }
   if (stop_.owed())
-    found.note(error(Reason::stopping, "a stop is owed to the drive, which was not seen at rest",
-                     "look at the machine; the stop is the first that the drive gets when it answers"));
+    found.note(
+        context_.error(Reason::stopping, "a stop is owed to the drive, which was not seen at rest",
+                       "look at the machine; the stop is the first that the drive gets when it answers"));
 }
 
 Result<void> Axis::check_online() const {
@@ -133,11 +131,12 @@ Result<void> Axis::check_online() const {
 void Axis::look_at_fault(Obstacles& found) const {
   if (!fault_) return;
   auto cause = *fault_;
-  cause.message = fmt::format("{}: in ErrorStop: {}", settings_.name, fault_->message);
+  cause.message = fmt::format("{}: in ErrorStop: {}", context_.settings.name, fault_->message);
   cause.reason = fault_->reason == Reason::alarm ? Reason::alarm : Reason::fault;
   if (fault_->outcome == Outcome::unknown) cause.message += "; what the drive did of it is unknown";
-  const auto reset =
-      fault_->outcome == Outcome::unknown ? shell("reset") + ", which reads the drive back" : shell("reset");
+  const auto reset = fault_->outcome == Outcome::unknown
+                         ? context_.shell("reset") + ", which reads the drive back"
+                         : context_.shell("reset");
   const bool said = cause.remedy.find("reset the axis") != cause.remedy.npos;
   if (said)
     cause.remedy += fmt::format(" ({})", reset);
@@ -149,157 +148,149 @@ void Axis::look_at_fault(Obstacles& found) const {
 
 void Axis::look_at_maintenance(Obstacles& found) const {
   if (!maintenance_.expired())
-    found.block(error(Reason::busy, "the drive's parameters or memory are being written", "wait for it"));
+    found.block(
+        context_.error(Reason::busy, "the drive's parameters or memory are being written", "wait for it"));
 }
 
 void Axis::look_at_readiness(const CommandOptions& options, Obstacles& found) const {
-  if (life_.retired()) return found.block(reloading());
+  if (life_.retired()) return found.block(context_.reloading());
   look_at_options(options, found);
   // Stops overtake what waits for the core: their order is that in which they arrived (M14).
   if (stop_.overtook(options.arrived))
-    found.block(
-        error(Reason::superseded, "a stop that arrived later was served first", "send a new request"));
+    found.block(context_.error(Reason::superseded, "a stop that arrived later was served first",
+                               "send a new request"));
   // A stop that the core has not seen yet comes before everything that is accepted now.
   look_at_holds(options, found);
   if (unheld() && stop_.forbids_motion())
-    found.block(error(Reason::stopping, "the axis is stopping", "wait for standstill"));
+    found.block(context_.error(Reason::stopping, "the axis is stopping", "wait for standstill"));
   look_at_fault(found);
   look_at_maintenance(found);
   if (power_.owes_release())
-    found.block(error(Reason::busy, "the drive is being released, because a lease ended", "wait for it"));
+    found.block(
+        context_.error(Reason::busy, "the drive is being released, because a lease ended", "wait for it"));
   found.block_on(check_journal());
   if (drift_.drifted())
-    found.block(error(
-        Reason::misconfigured, "the drive no longer holds its configuration: " + drift_.text(),
-        fmt::format("disable the axis ({}): the configuration is then applied again", shell("disable"))));
+    found.block(context_.error(Reason::misconfigured,
+                               "the drive no longer holds its configuration: " + drift_.text(),
+                               fmt::format("disable the axis ({}): the configuration is then applied again",
+                                           context_.shell("disable"))));
   look_at_link(found);
 }
 
 void Axis::look_at_motion(const CommandOptions& options, Obstacles& found) const {
-  if (env_.inhibited != nullptr && *env_.inhibited)
-    found.block(
-        error(Reason::inhibited, "StopAll holds the machine", "release it: axisctl release-stop --all"));
-  if (env_.state_unaccepted != nullptr && *env_.state_unaccepted) found.block(**env_.state_unaccepted);
+  if (context_.env.inhibited != nullptr && *context_.env.inhibited)
+    found.block(context_.error(Reason::inhibited, "StopAll holds the machine",
+                               "release it: axisctl release-stop --all"));
+  if (context_.env.state_unaccepted != nullptr && *context_.env.state_unaccepted)
+    found.block(**context_.env.state_unaccepted);
   look_at_readiness(options, found);
   const auto executed = activity_ ? std::optional(activity_->command->value().kind) : std::nullopt;
   if (executed == CommandKind::enable && options.buffer_mode == BufferMode::buffered)
-    found.note(error(Reason::disabled, "the axis is being enabled", "the start waits for that"));
+    found.note(context_.error(Reason::disabled, "the axis is being enabled", "the start waits for that"));
   else if (executed == CommandKind::enable)
-    found.block(error(Reason::disabled, "the axis is being enabled", "wait for the command to end"));
+    found.block(context_.error(Reason::disabled, "the axis is being enabled", "wait for the command to end"));
   else if (executed == CommandKind::disable)
-    found.block(
-        error(Reason::disabled, "the axis is being disabled", "enable it afterwards: " + shell("enable")));
-  else if (!sample_)
-    found.block(error(Reason::disabled, "the power stage is not known to be on",
-                      "enable the axis once the drive answers: " + shell("enable")));
-  else if (!sample_->enabled)
-    found.block(
-        error(Reason::disabled, "the power stage is off", "enable the axis first: " + shell("enable")));
+    found.block(context_.error(Reason::disabled, "the axis is being disabled",
+                               "enable it afterwards: " + context_.shell("enable")));
+  else if (!shaft_.sample())
+    found.block(context_.error(Reason::disabled, "the power stage is not known to be on",
+                               "enable the axis once the drive answers: " + context_.shell("enable")));
+  else if (!shaft_.sample()->enabled)
+    found.block(context_.error(Reason::disabled, "the power stage is off",
+                               "enable the axis first: " + context_.shell("enable")));
   else if (power_.state() == PowerMachine::State::restarted)
     // Whoever switched it off may have done so to reach into the machine (M1).
-    found.block(error(Reason::disabled,
-                      "the drive was switched off and on, and nobody has enabled the axis since",
-                      "see that the machine is clear, then enable the axis: " + shell("enable")));
-  if (terminal_motion_.moves())
-    found.block(error(Reason::terminal, "a terminal of the drive moves it",
-                      fmt::format("wait, or stop it: {}", shell("stop"))));
+    found.block(context_.error(
+        Reason::disabled, "the drive was switched off and on, and nobody has enabled the axis since",
+        "see that the machine is clear, then enable the axis: " + context_.shell("enable")));
+  if (shaft_.terminal_motion().moves())
+    found.block(context_.error(Reason::terminal, "a terminal of the drive moves it",
+                               fmt::format("wait, or stop it: {}", context_.shell("stop"))));
   look_at_holding_terminals(holding_functions, found);
 }
 
 /// The drive decides what an active terminal does to a start: worth knowing, but not refused for.
 void Axis::look_at_holding_terminals(std::span<const std::string_view> functions, Obstacles& found) const {
-  if (!sample_ || !link_.online()) return;
-  for (const auto& input : settings_.inputs)
-    if (std::ranges::find(functions, input.function) != functions.end() && terminals_.active(*sample_, input))
-      found.note(error(Reason::terminal,
-                       fmt::format("terminal {} ({}) is active: the drive may not start, or stop at once",
-                                   input.terminal, input.function),
-                       "release the terminal, or check its active level in the YAML"));
+  if (!shaft_.sample() || !link_.online()) return;
+  for (const auto& input : context_.settings.inputs)
+    if (std::ranges::find(functions, input.function) != functions.end() &&
+        context_.terminals.active(*shaft_.sample(), input))
+      found.note(
+          context_.error(Reason::terminal,
+                         fmt::format("terminal {} ({}) is active: the drive may not start, or stop at once",
+                                     input.terminal, input.function),
+                         "release the terminal, or check its active level in the YAML"));
 }
 
 /// What forbids some motions and permits others.
 void Axis::look_at_what_forbids_some(Obstacles& found) const {
-  if (tracker_.trust() == PositionTrust::unknown &&
-      (settings_.require_trust || settings_.limits.position_minimum))
-    found.note(
-        not_trusted(settings_.require_trust
-                        ? "the position is unknown: absolute moves are refused, and limits cannot be kept"
-                        : "the position is unknown: absolute moves and limits go by what the drive "
-                          "counts, wherever the load is"));
+  if (shaft_.tracker().trust() == PositionTrust::unknown &&
+      (context_.settings.require_trust || context_.settings.limits.position_minimum))
+    found.note(context_.not_trusted(
+        context_.settings.require_trust
+            ? "the position is unknown: absolute moves are refused, and limits cannot be kept"
+            : "the position is unknown: absolute moves and limits go by what the drive "
+              "counts, wherever the load is"));
   for (const bool positive : {true, false})
-    if (limit_active(positive)) found.note(direction_blocked(positive));
-  if (auto possible = check_velocity_mode(); !possible) found.note(possible.error());
-}
-
-Error Axis::not_trusted(std::string message) const {
-  const auto set = shell("set-position", "VALUE");
-  return error(Reason::not_trusted, std::move(message),
-               settings_.homing
-                   ? fmt::format("home the axis: {}, or set its position: {}", shell("home"), set)
-                   : fmt::format("set its position: {}", set));
-}
-
-Error Axis::direction_blocked(bool positive) const {
-  return error(Reason::limit_switch,
-               fmt::format("the {} limit switch is active", positive ? "positive" : "negative"),
-               "move away from it: " +
-                   (check_velocity_mode() ? shell("jog", positive ? "-VELOCITY" : "VELOCITY")
-                                          : shell("move", positive ? "--relative -WAY" : "--relative WAY")));
+    if (shaft_.limit_active(positive)) found.note(context_.direction_blocked(positive));
+  if (auto possible = context_.check_velocity_mode(); !possible) found.note(possible.error());
 }
 
 void Axis::look_at_direction(bool positive, Obstacles& found) const {
-  if (limit_active(positive)) found.block(direction_blocked(positive));
+  if (shaft_.limit_active(positive)) found.block(context_.direction_blocked(positive));
 }
 
 /// M9: a start that is accepted waits for the end of what moves.
 void Axis::look_at_present_motion(Obstacles& found) const {
   if (found.blocked()) return;
   const bool moves = (activity_ && activity_->state != AxisState::standstill) || stop_.under_way() ||
-                     (sample_ && sample_->moving && !terminal_motion_.moves());
+                     (shaft_.sample() && shaft_.sample()->moving && !shaft_.terminal_motion().moves());
   const auto executed = activity_ ? fmt::format("{} {}", to_string(activity_->command->value().kind),
                                                 activity_->command->value().id)
                                   : std::string();
   if (moves)
-    found.note(error(Reason::moving, activity_ ? "the axis moves: " + executed : "the axis moves",
-                     activity_ ? "that is halted and ends Aborted; the start waits for standstill"
-                               : "the start waits for standstill"));
+    found.note(context_.error(Reason::moving, activity_ ? "the axis moves: " + executed : "the axis moves",
+                              activity_ ? "that is halted and ends Aborted; the start waits for standstill"
+                                        : "the start waits for standstill"));
   else if (activity_)
-    found.note(error(Reason::busy, "another command is being executed: " + executed, "it ends Aborted"));
+    found.note(
+        context_.error(Reason::busy, "another command is being executed: " + executed, "it ends Aborted"));
 }
 
 /// Its start waits for those of others on its line: one that could not be in time is told so at once (M31).
 /// Who started lately leaves the last third of that time to the others. What was buffered was accepted
 /// before.
 void Axis::look_at_line(Obstacles& found) const {
-  const auto* turns = env_.bus->start_turns();
+  const auto* turns = context_.env.bus->start_turns();
   if (turns == nullptr || buffer_.starts() || found.blocked()) return;
   const auto wait = turns->expected_wait();
-  const bool lately = env_.clock->now() - had_turn_ < settings_.start_within;
-  const auto most = lately ? settings_.start_within / 2 : settings_.start_within * 3 / 4;
+  const bool lately = context_.env.clock->now() - had_turn_ < context_.settings.start_within;
+  const auto most = lately ? context_.settings.start_within / 2 : context_.settings.start_within * 3 / 4;
   const auto in_ms = std::chrono::round<std::chrono::milliseconds>(wait).count();
   if (wait > most)
-    found.block(error(
+    found.block(context_.error(
         Reason::busy,
         fmt::format("the line is full: starts of {} axes wait already, for {} ms", turns->waiting(), in_ms),
         "repeat it later; fewer axes on the line, a higher baud rate or a longer "
         "start_within permit more starts"));
   else if (turns->waiting() > 0)
-    found.note(error(Reason::busy,
-                     fmt::format("starts of {} axes on the line come before it", turns->waiting()),
-                     fmt::format("it waits for about {} ms", in_ms)));
+    found.note(context_.error(Reason::busy,
+                              fmt::format("starts of {} axes on the line come before it", turns->waiting()),
+                              fmt::format("it waits for about {} ms", in_ms)));
 }
 
 void Axis::look_at_target(const PositionTracker::Target& target, Obstacles& found) const {
-  planner_.check_move(target, tracker_, found);
-  if (target.counter != tracker_.counter()) look_at_direction(planner_.positive(target, tracker_), found);
+  context_.planner.check_move(target, shaft_.tracker(), found);
+  if (target.counter != shaft_.tracker().counter())
+    look_at_direction(context_.planner.positive(target, shaft_.tracker()), found);
 }
 
 void Axis::look_at(const EnableRequest& /*request*/, const CommandOptions& options, Obstacles& found) const {
   look_at_readiness(options, found);
   // A drive that turns while it is being enabled was moved by that, as far as can be told.
-  if (!at_rest()) found.block(error(Reason::moving, "the axis moves", "wait for standstill"));
+  if (!at_rest()) found.block(context_.error(Reason::moving, "the axis moves", "wait for standstill"));
   if (activity_ && activity_->state == AxisState::standstill)
-    found.block(error(Reason::busy, "another command is being executed", "wait for it"));
+    found.block(context_.error(Reason::busy, "another command is being executed", "wait for it"));
   static constexpr std::string_view releasing[] = {"motor_free"};
   look_at_holding_terminals(releasing, found);
 }
@@ -312,24 +303,16 @@ void Axis::look_at(const DisableRequest& /*request*/, const CommandOptions& /*op
 
 void Axis::look_at(const HomeRequest& /*request*/, const CommandOptions& options, Obstacles& found) const {
   look_at_motion(options, found);
-  if (!settings_.homing) {
-    found.block(
-        error(Reason::not_supported, "no homing is configured", "add homing: to the axis in the YAML"));
-  } else if (on_homing_switch() && !settings_.homing->backoff) {
-    found.block(error(Reason::limit_switch, fmt::format("the {} switch is already active", homing_switch()),
-                      "move away from it, or configure homing: { backoff: ... }"));
+  if (!context_.settings.homing) {
+    found.block(context_.error(Reason::not_supported, "no homing is configured",
+                               "add homing: to the axis in the YAML"));
+  } else if (shaft_.on_homing_switch() && !context_.settings.homing->backoff) {
+    found.block(context_.error(Reason::limit_switch,
+                               fmt::format("the {} switch is already active", context_.homing_switch()),
+                               "move away from it, or configure homing: { backoff: ... }"));
   }
   look_at_present_motion(found);
   look_at_line(found);
-}
-
-/// A rotary axis goes the shorter way round.
-PositionTracker::Target Axis::target_of(const MoveAbsoluteRequest& request,
-                                        const PositionTracker& from) const {
-  auto position = request.position;
-  if (settings_.scale.modulo)
-    position = from.position() + std::remainder(position - from.position(), *settings_.scale.modulo);
-  return from.plan_absolute(position);
 }
 
 void Axis::look_at(const MoveAbsoluteRequest& request, const CommandOptions& options,
@@ -337,11 +320,12 @@ void Axis::look_at(const MoveAbsoluteRequest& request, const CommandOptions& opt
   look_at_motion(options, found);
   const bool number = std::isfinite(request.position);
   if (!number)
-    found.block(error(Reason::invalid_argument, "the position is not a number", "give a finite position"));
-  const bool lost = settings_.require_trust && tracker_.trust() == PositionTrust::unknown;
-  if (lost) found.block(not_trusted("the position is unknown"));
-  planner_.check_profile(velocity_of(request.with), request.with, found);
-  if (number && !lost) look_at_target(target_of(request, tracker_), found);
+    found.block(
+        context_.error(Reason::invalid_argument, "the position is not a number", "give a finite position"));
+  const bool lost = context_.settings.require_trust && shaft_.tracker().trust() == PositionTrust::unknown;
+  if (lost) found.block(context_.not_trusted("the position is unknown"));
+  context_.planner.check_profile(context_.velocity_of(request.with), request.with, found);
+  if (number && !lost) look_at_target(context_.target_of(request, shaft_.tracker()), found);
   look_at_present_motion(found);
   look_at_line(found);
 }
@@ -351,42 +335,36 @@ void Axis::look_at(const MoveRelativeRequest& request, const CommandOptions& opt
   look_at_motion(options, found);
   const bool number = std::isfinite(request.distance);
   if (!number)
-    found.block(error(Reason::invalid_argument, "the distance is not a number", "give a finite distance"));
+    found.block(
+        context_.error(Reason::invalid_argument, "the distance is not a number", "give a finite distance"));
   if ((activity_ && activity_->state != AxisState::standstill) || stop_.under_way() ||
-      (sample_ && sample_->moving))
-    found.block(error(Reason::moving, "a relative move needs standstill: its base would be uncertain",
-                      "wait for standstill, or move to an absolute position"));
-  const bool limited = settings_.limits.position_minimum.has_value();
-  if (number && limited && tracker_.trust() == PositionTrust::unknown &&
-      std::abs(request.distance) > settings_.jog_travel) {
-    auto lost = not_trusted("the position is unknown, so limits cannot be kept");
+      (shaft_.sample() && shaft_.sample()->moving))
+    found.block(context_.error(Reason::moving,
+                               "a relative move needs standstill: its base would be uncertain",
+                               "wait for standstill, or move to an absolute position"));
+  const bool limited = context_.settings.limits.position_minimum.has_value();
+  if (number && limited && shaft_.tracker().trust() == PositionTrust::unknown &&
+      std::abs(request.distance) > context_.settings.jog_travel) {
+    auto lost = context_.not_trusted("the position is unknown, so limits cannot be kept");
     lost.remedy += "; shorter moves are bounded by jog_travel";
-    lost.permitted = Range{
-        .minimum = -settings_.jog_travel, .maximum = settings_.jog_travel, .unit = settings_.scale.unit};
+    lost.permitted = Range{.minimum = -context_.settings.jog_travel,
+                           .maximum = context_.settings.jog_travel,
+                           .unit = context_.settings.scale.unit};
     found.block(std::move(lost));
   }
-  planner_.check_profile(velocity_of(request.with), request.with, found);
-  if (number) look_at_target(tracker_.plan_relative(request.distance), found);
+  context_.planner.check_profile(context_.velocity_of(request.with), request.with, found);
+  if (number) look_at_target(shaft_.tracker().plan_relative(request.distance), found);
   look_at_line(found);
 }
 
-Result<void> Axis::check_velocity_mode() const {
-  const auto& capabilities = descriptor_->capabilities;
-  if (capabilities.velocity_mode) return {};
-  return fail(error(
-      Reason::not_supported,
-      fmt::format("the drive can neither jog nor run at a velocity: {}", capabilities.velocity_mode_lack),
-      "give it positions: " + shell("move", "--relative WAY")));
-}
-
 void Axis::look_at_velocity(double velocity, const MotionValues& with, bool jog, Obstacles& found) const {
-  found.block_on(check_velocity_mode());
-  planner_.check_profile(velocity, with, found);
+  found.block_on(context_.check_velocity_mode());
+  context_.planner.check_profile(velocity, with, found);
   if (!std::isfinite(velocity) || velocity == 0) return;
   look_at_direction(velocity > 0, found);
   const auto end = end_of_velocity(velocity > 0, jog);
   found.block_on(end);
-  if (end && *end) planner_.check_move(**end, tracker_, found);
+  if (end && *end) context_.planner.check_move(**end, shaft_.tracker(), found);
 }
 
 void Axis::look_at(const MoveVelocityRequest& request, const CommandOptions& options,
@@ -410,31 +388,35 @@ void Axis::look_at(const ResetRequest& /*request*/, const CommandOptions& option
   look_at_options(options, found);
   look_at_link(found);
   look_at_maintenance(found);
-  if (stop_.under_way()) found.block(error(Reason::stopping, "the axis is stopping", "wait for standstill"));
-  if (activity_) found.block(error(Reason::busy, "another command is being executed", "wait for it"));
-  if (!sample_ || sample_->alarm_code == 0) return;
+  if (stop_.under_way())
+    found.block(context_.error(Reason::stopping, "the axis is stopping", "wait for standstill"));
+  if (activity_)
+    found.block(context_.error(Reason::busy, "another command is being executed", "wait for it"));
+  if (!shaft_.sample() || shaft_.sample()->alarm_code == 0) return;
   // All others may have lost their cause and wait for this: the drive says whether they have.
-  const auto* spec = find_alarm(*descriptor_, sample_->alarm_code);
+  const auto* spec = find_alarm(*context_.descriptor, shaft_.sample()->alarm_code);
   if (spec != nullptr && spec->reset == AlarmReset::power_cycle)
-    found.block(alarm_error(sample_->alarm_code, "only a power cycle ends"));
+    found.block(context_.alarm_error(shaft_.sample()->alarm_code, "only a power cycle ends"));
 }
 
 void Axis::look_at(const SetPositionRequest& request, const CommandOptions& options, Obstacles& found) const {
   look_at_readiness(options, found);
-  if (activity_ || stop_.under_way() || (sample_ && sample_->moving))
-    found.block(error(Reason::moving, "the position can only be set at standstill", "wait for standstill"));
-  const bool number = scale_.checked_pulses(request.position).has_value();
-  if (number && absolute_segments_ && !is_from_home(tracker_.offset_for(request.position)))
-    found.block(error(Reason::not_supported,
-                      "the drive's absolute segments count from home: another position would not move them",
-                      "home the axis instead: " + shell("home")));
-  // A released motor can be turned by hand: its position would be lost again at once (M20).
-  if (sample_ && !sample_->enabled && !counts_while_released())
-    found.block(error(Reason::disabled, "the power stage is off, so the position would not hold",
-                      "enable the axis first: " + shell("enable")));
-  if (!number)
+  if (activity_ || stop_.under_way() || (shaft_.sample() && shaft_.sample()->moving))
     found.block(
-        error(Reason::invalid_argument, "the position is not a usable number", "give a finite position"));
+        context_.error(Reason::moving, "the position can only be set at standstill", "wait for standstill"));
+  const bool number = context_.scale.checked_pulses(request.position).has_value();
+  if (number && absolute_segments_ && !context_.is_from_home(shaft_.tracker().offset_for(request.position)))
+    found.block(
+        context_.error(Reason::not_supported,
+                       "the drive's absolute segments count from home: another position would not move them",
+                       "home the axis instead: " + context_.shell("home")));
+  // A released motor can be turned by hand: its position would be lost again at once (M20).
+  if (shaft_.sample() && !shaft_.sample()->enabled && !context_.counts_while_released())
+    found.block(context_.error(Reason::disabled, "the power stage is off, so the position would not hold",
+                               "enable the axis first: " + context_.shell("enable")));
+  if (!number)
+    found.block(context_.error(Reason::invalid_argument, "the position is not a usable number",
+                               "give a finite position"));
 }
 
 }  // namespace axisd

@@ -29,82 +29,90 @@ std::string new_notes(std::string_view before, std::string_view now) {
 
 /// M29: the edge lies between the previous sample and this one.
 void Axis::tell_edges(const DriveSample& before, const DriveSample& now) {
-  if (!env_.event || (before.inputs == now.inputs && before.outputs == now.outputs)) return;
+  if (!context_.env.event || (before.inputs == now.inputs && before.outputs == now.outputs)) return;
   const auto tell = [&](const std::vector<TerminalState>& was, const std::vector<TerminalState>& is) {
     for (std::size_t i = 0; i < is.size(); ++i)
       if (was[i].active != is[i].active)
-        env_.event(settings_.name, TerminalEdge{.terminal = is[i].name,
-                                                .function = is[i].function,
-                                                .active = is[i].active,
-                                                .after = env_.clock->wall(before.asked_at),
-                                                .before = env_.clock->wall(now.measured_at)});
+        context_.env.event(context_.settings.name,
+                           TerminalEdge{.terminal = is[i].name,
+                                        .function = is[i].function,
+                                        .active = is[i].active,
+                                        .after = context_.env.clock->wall(before.asked_at),
+                                        .before = context_.env.clock->wall(now.measured_at)});
   };
-  tell(terminals_.inputs(before.inputs), terminals_.inputs(now.inputs));
-  tell(terminals_.outputs(before.outputs), terminals_.outputs(now.outputs));
+  tell(context_.terminals.inputs(before.inputs), context_.terminals.inputs(now.inputs));
+  tell(context_.terminals.outputs(before.outputs), context_.terminals.outputs(now.outputs));
 }
 
 void Axis::tell_changes(const AxisSnapshot& before, const AxisSnapshot& now) {
-  if (!env_.event) return;
+  if (!context_.env.event) return;
   if (before.link != now.link)
-    env_.event(
-        settings_.name,
+    context_.env.event(
+        context_.settings.name,
         LinkChange{.to = now.link, .detail = now.link_error ? now.link_error->message : std::string()});
   // While it is being connected the notes follow from what it was found to be.
   const bool was_online = before.link == LinkState::online;
   if (auto news = new_notes(before.link_note, now.link_note); was_online && !news.empty())
-    env_.event(settings_.name, LinkChange{.to = now.link, .detail = std::move(news)});
+    context_.env.event(context_.settings.name, LinkChange{.to = now.link, .detail = std::move(news)});
   if (before.state != now.state)
-    env_.event(settings_.name, StateChange{.from = before.state, .to = now.state, .cause = now.motion_cause});
+    context_.env.event(context_.settings.name,
+                       StateChange{.from = before.state, .to = now.state, .cause = now.motion_cause});
   const bool other_fault = now.fault && (!before.fault || before.fault->reason != now.fault->reason ||
                                          before.fault->message != now.fault->message);
-  if (other_fault) env_.event(settings_.name, AxisFault{.cause = *now.fault});
-  if (before.drift != now.drift) env_.event(settings_.name, ConfigurationDrift{.text = now.drift});
+  if (other_fault) context_.env.event(context_.settings.name, AxisFault{.cause = *now.fault});
+  if (before.drift != now.drift)
+    context_.env.event(context_.settings.name, ConfigurationDrift{.text = now.drift});
 }
 
 MotionCause Axis::motion_cause() const {
-  if (terminal_motion_.moves()) return MotionCause::terminal;
-  if (!sample_ || !sample_->moving) return MotionCause::none;
+  if (shaft_.terminal_motion().moves()) return MotionCause::terminal;
+  if (!shaft_.sample() || !shaft_.sample()->moving) return MotionCause::none;
   if (activity_ && activity_->state != AxisState::standstill) return MotionCause::command;
-  const bool by_terminal = sample_->mode >= DriveMode::multi_position || terminals_.start_active(*sample_);
+  const bool by_terminal =
+      shaft_.sample()->mode >= DriveMode::multi_position || context_.terminals.start_active(*shaft_.sample());
   return stop_.left_running() && !by_terminal ? MotionCause::command : MotionCause::unknown;
 }
 
 /// False: nothing was written since the last look. Else the next sample is published, whatever it says.
 bool Axis::note_eeprom_writes() {
-  const auto written = drive_->take_eeprom_writes();
+  const auto written = context_.drive->take_eeprom_writes();
   if (written.saves == 0) return false;
   sampled_revision_ = 0;  // to be published
   eeprom_writes_ += written.registers;
-  eeprom_budget_.count(written.saves, env_.clock->wall(env_.clock->now()));
-  if (env_.persistence != nullptr)
-    env_.persistence->count_eeprom_writes(settings_.name, written.registers, eeprom_budget_.record(), {});
+  eeprom_budget_.count(written.saves, context_.env.clock->wall(context_.env.clock->now()));
+  if (context_.env.persistence != nullptr)
+    context_.env.persistence->count_eeprom_writes(context_.settings.name, written.registers,
+                                                  eeprom_budget_.record(), {});
   if (written.registers > 0)
-    env_.event(settings_.name, EepromWritten{.registers = written.registers, .total = eeprom_writes_});
+    context_.env.event(context_.settings.name,
+                       EepromWritten{.registers = written.registers, .total = eeprom_writes_});
   return true;
 }
 
 /// Of the drive, whatever it saves for.
 Result<void> Axis::permit_saves(std::uint64_t saves) {
   note_eeprom_writes();
-  const auto now = env_.clock->wall(env_.clock->now());
+  const auto now = context_.env.clock->wall(context_.env.clock->now());
   // Kept, so that hours of a clock that was set back are not found in the future again at each start.
-  if (eeprom_budget_.settle(now) && env_.persistence != nullptr)
-    env_.persistence->count_eeprom_writes(settings_.name, 0, eeprom_budget_.record(), {});
+  if (eeprom_budget_.settle(now) && context_.env.persistence != nullptr)
+    context_.env.persistence->count_eeprom_writes(context_.settings.name, 0, eeprom_budget_.record(), {});
   auto permitted = eeprom_budget_.permit(saves, now);
-  if (!permitted) permitted.error().where = {.bus = settings_.bus, .node = settings_.node};
+  if (!permitted) permitted.error().where = {.bus = context_.settings.bus, .node = context_.settings.node};
   return permitted;
 }
 
 void Axis::show_position(AxisSnapshot& shown) const {
-  shown.position = tracker_.position();
-  if (sample_ && sample_->commanded_pulses) {
-    const auto ahead = static_cast<std::int32_t>(static_cast<std::uint32_t>(*sample_->commanded_pulses) -
-                                                 static_cast<std::uint32_t>(sample_->position_pulses));
-    shown.commanded_position = scale_.to_units(tracker_.counter() + tracker_.offset() + ahead);
+  shown.position = shaft_.tracker().position();
+  if (shaft_.sample() && shaft_.sample()->commanded_pulses) {
+    const auto ahead =
+        static_cast<std::int32_t>(static_cast<std::uint32_t>(*shaft_.sample()->commanded_pulses) -
+                                  static_cast<std::uint32_t>(shaft_.sample()->position_pulses));
+    shown.commanded_position =
+        context_.scale.to_units(shaft_.tracker().counter() + shaft_.tracker().offset() + ahead);
     shown.following_error = *shown.commanded_position - shown.position;
   }
-  if (settings_.scale.modulo) {
-    const auto into_turn = [turn = *settings_.scale.modulo](double position) {
+  if (context_.settings.scale.modulo) {
+    const auto into_turn = [turn = *context_.settings.scale.modulo](double position) {
       return position - std::floor(position / turn) * turn;
     };
     shown.position = into_turn(shown.position);
@@ -114,63 +122,64 @@ void Axis::show_position(AxisSnapshot& shown) const {
 
 /// What the drive tells of itself.
 void Axis::show_sample(AxisSnapshot& shown) const {
-  const auto bits = sample_.value_or(DriveSample{});
-  shown.inputs = terminals_.inputs(bits.inputs);
-  shown.outputs = terminals_.outputs(bits.outputs);
-  if (!sample_) return;
+  const auto bits = shaft_.sample().value_or(DriveSample{});
+  shown.inputs = context_.terminals.inputs(bits.inputs);
+  shown.outputs = context_.terminals.outputs(bits.outputs);
+  if (!shaft_.sample()) return;
   shown.enabled = bits.enabled;
   // The sign of the speed register is not said; the direction register's is.
-  const auto speed = std::abs(scale_.velocity_to_units(bits.velocity_rpm));
-  shown.velocity = shaft_.positive() || speed == 0 ? speed : -speed;
+  const auto speed = std::abs(context_.scale.velocity_to_units(bits.velocity_rpm));
+  shown.velocity = shaft_.watch().positive() || speed == 0 ? speed : -speed;
   shown.moving = bits.moving;
   shown.in_position = bits.in_position;
   shown.homed = bits.homed;
   shown.alarm_code = bits.alarm_code;
-  const auto* alarm = bits.alarm_code == 0 ? nullptr : find_alarm(*descriptor_, bits.alarm_code);
+  const auto* alarm = bits.alarm_code == 0 ? nullptr : find_alarm(*context_.descriptor, bits.alarm_code);
   if (alarm != nullptr) shown.alarm_name = alarm->name;
-  shown.sampled.set(bits.asked_at, bits.measured_at, env_.clock->wall(bits.measured_at));
+  shown.sampled.set(bits.asked_at, bits.measured_at, context_.env.clock->wall(bits.measured_at));
 }
 
 void Axis::publish() {
   note_eeprom_writes();
   auto next = boost::make_shared<AxisSnapshot>();
-  next->name = settings_.name;
-  next->bus = settings_.bus;
-  next->node = settings_.node;
-  next->model = settings_.model;
-  next->own_descriptor = settings_.own_descriptor;
-  next->unit = settings_.scale.unit;
-  next->simulated = simulated_;
+  next->name = context_.settings.name;
+  next->bus = context_.settings.bus;
+  next->node = context_.settings.node;
+  next->model = context_.settings.model;
+  next->own_descriptor = context_.settings.own_descriptor;
+  next->unit = context_.settings.scale.unit;
+  next->simulated = context_.simulated;
   next->state = state();
   next->link = link_.shown();
   next->link_error = link_.error();
-  next->link_note = drive_->link_note();
-  next->start_note = drive_->no_common_start();
+  next->link_note = context_.drive->link_note();
+  next->start_note = context_.drive->no_common_start();
   next->fault = fault_;
-  if (env_.holds != nullptr) next->holds = env_.holds->all();
-  next->inhibited = env_.inhibited != nullptr && *env_.inhibited;
+  if (context_.env.holds != nullptr) next->holds = context_.env.holds->all();
+  next->inhibited = context_.env.inhibited != nullptr && *context_.env.inhibited;
   next->enabled_by_us = power_.enabled_by_us();
-  next->trust = tracker_.trust();
-  next->position_source = descriptor_->capabilities.position_source;
+  next->trust = shaft_.tracker().trust();
+  next->position_source = context_.descriptor->capabilities.position_source;
   show_position(*next);
   next->identity = identity_;
   next->reboots = link_.restarts();
   next->drift = drift_.text();
   next->eeprom_writes = eeprom_writes_;
   next->motion_cause = motion_cause();
-  if (const auto* lease = env_.leases->find(settings_.name)) next->lease_holder = lease->holder();
+  if (const auto* lease = context_.env.leases->find(context_.settings.name))
+    next->lease_holder = lease->holder();
   next->revision = ++revision_;
-  next->positive_direction = shaft_.positive();
+  next->positive_direction = shaft_.watch().positive();
   if (activity_) {
     next->command_id = activity_->command->value().id;
     if (activity_->plan.target) next->target = activity_->plan.target->position;
   }
   show_sample(*next);
   shown_ = next;
-  const auto before = face_->snapshot.load();
-  face_->snapshot.store(next);
+  const auto before = context_.face->snapshot.load();
+  context_.face->snapshot.store(next);
   if (before) tell_changes(*before, *next);
-  if (env_.published) env_.published();
+  if (context_.env.published) context_.env.published();
 }
 
 }  // namespace axisd

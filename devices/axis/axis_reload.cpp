@@ -13,7 +13,7 @@ namespace axisd {
 std::vector<Error> Axis::check_exchange(bool energised) const {
   std::vector<Error> found;
   const auto add = [&](Reason reason, std::string message, std::string remedy) {
-    found.push_back(error(reason, std::move(message), std::move(remedy)));
+    found.push_back(context_.error(reason, std::move(message), std::move(remedy)));
   };
   if (life_.ends()) add(Reason::reloading, "it is being reloaded already", "wait for it");
   if (activity_) {
@@ -21,9 +21,10 @@ std::vector<Error> Axis::check_exchange(bool energised) const {
     add(activity_->state == AxisState::standstill ? Reason::busy : Reason::moving,
         fmt::format("executes {} {}{}", to_string(command.kind), command.id,
                     buffer_.empty() ? "" : fmt::format(", and {} more wait for it", buffer_.size())),
-        "wait for its end, or stop it: " + shell("stop"));
-  } else if ((sample_ && sample_->moving && !stop_.owed()) || terminal_motion_.moves()) {
-    add(Reason::moving, "the axis moves", "wait for standstill, or stop it: " + shell("stop"));
+        "wait for its end, or stop it: " + context_.shell("stop"));
+  } else if ((shaft_.sample() && shaft_.sample()->moving && !stop_.owed()) ||
+             shaft_.terminal_motion().moves()) {
+    add(Reason::moving, "the axis moves", "wait for standstill, or stop it: " + context_.shell("stop"));
   }
   if (stop_.coming()) add(Reason::stopping, "the axis is stopping", "wait for standstill");
   if (stop_.owed() && !stop_.under_way())
@@ -37,50 +38,47 @@ std::vector<Error> Axis::check_exchange(bool energised) const {
     add(Reason::busy, "what became of a command of before the daemon's start is not known yet",
         "wait until the drive has been asked");
   // Nobody would look after a drive that is left, and one that stays is not configured under power (M1).
-  if (sample_ && sample_->enabled && (!energised || drift_.drifted()))
+  if (shaft_.sample() && shaft_.sample()->enabled && (!energised || drift_.drifted()))
     add(Reason::busy,
         link_.online() ? "its power stage is on" : "its power stage was on when it was last seen",
         link_.online()
-            ? "disable it first: " + shell("disable")
+            ? "disable it first: " + context_.shell("disable")
             : "look at the machine and let the drive answer; or restart the service with this configuration");
   // The one that comes after would take it for energised since ever (M1).
-  if (power_.state() == PowerMachine::State::restarted && sample_ && sample_->enabled)
+  if (power_.state() == PowerMachine::State::restarted && shaft_.sample() && shaft_.sample()->enabled)
     add(Reason::busy, "its drive was switched off and on, and is energised",
-        "enable or disable it first: " + shell("enable"));
+        "enable or disable it first: " + context_.shell("enable"));
   if (fault_)  // whoever comes after would know nothing of it
-    add(Reason::fault, "in ErrorStop: " + fault_->message, "reset it first: " + shell("reset"));
+    add(Reason::fault, "in ErrorStop: " + fault_->message, "reset it first: " + context_.shell("reset"));
   return found;
-}
-
-Error Axis::reloading() const {
-  return error(Reason::reloading, "its configuration is being reloaded", "repeat it in a moment");
 }
 
 void Axis::retire(bool position_holds) {
   life_.retire(!link_.offline());
-  link_.explain(reloading());
-  if (terminal_may_void_position() || !position_holds) lose_trust();
-  if (!position_holds && env_.persistence != nullptr)
-    forget_position(*env_.persistence, settings_.name, power_.state() == PowerMachine::State::restarted);
+  link_.explain(context_.reloading());
+  if (context_.terminal_may_void_position() || !position_holds) lose_trust();
+  if (!position_holds && context_.env.persistence != nullptr)
+    forget_position(*context_.env.persistence, context_.settings.name,
+                    power_.state() == PowerMachine::State::restarted);
   remember_position();
   // By this the axis that comes after it finds a restart of the drive, also where there is no position (M1).
-  const bool keeps_canary =
-      env_.persistence != nullptr && link_.is_configured() && drive_->continuity_mark().has_value();
-  if (keeps_canary && tracker_.trust() == PositionTrust::unknown)
-    env_.persistence->save_offset(settings_.name, offset_record(tracker_.offset(), PositionTrust::unknown),
-                                  {});
+  const bool keeps_canary = context_.env.persistence != nullptr && link_.is_configured() &&
+                            context_.drive->continuity_mark().has_value();
+  if (keeps_canary && shaft_.tracker().trust() == PositionTrust::unknown)
+    context_.env.persistence->save_offset(
+        context_.settings.name, offset_record(shaft_.tracker().offset(), PositionTrust::unknown), {});
   close();
-  env_.bus->port_changed().notify_all();  // whoever waits for the port looks again
+  context_.env.bus->port_changed().notify_all();  // whoever waits for the port looks again
 }
 
 Result<std::shared_ptr<void>> Axis::use() {
-  if (life_.retired()) return fail(reloading());
+  if (life_.retired()) return fail(context_.reloading());
   return users_;
 }
 
 void Axis::take_stop(const StopRequest& request, const CommandOptions& options, CommandPtr command) {
-  accept_epoch_ = gate_->epoch();
-  gate_->stop_served();
+  accept_epoch_ = context_.gate->epoch();
+  context_.gate->stop_served();
   execute_stop(request, options, std::move(command));
 }
 

@@ -41,19 +41,19 @@ std::string text_of(double pulses_per_second, const Scale& scale) {
 /// lost with it: what a pulse is to the drive may not be what the configuration says (M20 has it lost with a
 /// microstep that changed), and an open loop may not have followed at such a speed.
 bool Axis::watch_speed(SpeedWatch::Event event) {
-  if (!sample_) return false;
-  const SpeedWatch::Reading reading{.asked_at = sample_->asked_at,
-                                    .measured_at = sample_->measured_at,
-                                    .pulses = sample_->position_pulses,
-                                    .moving = sample_->moving};
+  if (!shaft_.sample()) return false;
+  const SpeedWatch::Reading reading{.asked_at = shaft_.sample()->asked_at,
+                                    .measured_at = shaft_.sample()->measured_at,
+                                    .pulses = shaft_.sample()->position_pulses,
+                                    .moving = shaft_.sample()->moving};
   const bool under_way = activity_ && activity_->start.has_begun();
   if (!under_way) {
     speed_watch_.rest(reading);
     return false;
   }
   if (event == SpeedWatch::Event::begun) {
-    const auto per_rpm = static_cast<double>(settings_.scale.pulses_per_revolution) / 60;
-    speed_watch_.begin(reading, fastest_of(*activity_, settings_, scale_) * per_rpm);
+    const auto per_rpm = static_cast<double>(context_.settings.scale.pulses_per_revolution) / 60;
+    speed_watch_.begin(reading, fastest_of(*activity_, context_.settings, context_.scale) * per_rpm);
     return false;
   }
   const bool found =
@@ -62,14 +62,17 @@ bool Axis::watch_speed(SpeedWatch::Event event) {
   lose_trust();
   fail_with_stop(
       *activity_,
-      error(Reason::misconfigured,
-            fmt::format("the shaft turned at {} or more, but was told to turn at {} at most; most likely the "
-                        "units of the axis are not those of the drive",
-                        text_of(speed_watch_.seen(), scale_), text_of(speed_watch_.fastest(), scale_)),
-            fmt::format(
-                "compare scale.microstep{} with the drive; then reset the axis, "
-                "try slowly, and home it",
-                has_velocity_unit(descriptor()) ? ", the drive's own gear and drive: velocity_unit" : "")));
+      context_.error(
+          Reason::misconfigured,
+          fmt::format("the shaft turned at {} or more, but was told to turn at {} at most; most likely the "
+                      "units of the axis are not those of the drive",
+                      text_of(speed_watch_.seen(), context_.scale),
+                      text_of(speed_watch_.fastest(), context_.scale)),
+          fmt::format("compare scale.microstep{} with the drive; then reset the axis, "
+                      "try slowly, and home it",
+                      has_velocity_unit(*context_.descriptor)
+                          ? ", the drive's own gear and drive: velocity_unit"
+                          : "")));
   return true;
 }
 

@@ -35,8 +35,8 @@ Task<> first_attempt_to_open(Bus& bus, const Clock& clock) {
 }  // namespace
 
 void Axis::revoke_motion() {
-  gate_->raise();
-  env_.bus->purge_superseded(settings_.node, *gate_);
+  context_.gate->raise();
+  context_.env.bus->purge_superseded(context_.settings.node, *context_.gate);
 }
 
 /// Ends what is being executed. Nothing that was prepared for it is sent any more.
@@ -63,18 +63,18 @@ void Axis::begin_stop(StopKind kind, CommandPtr command) {
   if (command) {
     command->activate();
     if (const auto oldest = stop_.serve(std::move(command)))
-      oldest->abort(error(Reason::superseded, "newer stops of the same client have taken its place",
-                          "wait for the newest one"));
+      oldest->abort(context_.error(Reason::superseded, "newer stops of the same client have taken its place",
+                                   "wait for the newest one"));
   }
-  env_.bus->hasten(settings_.node, TransactionClass::moving_state);
+  context_.env.bus->hasten(context_.settings.node, TransactionClass::moving_state);
   if (stop_.begin()) {
     launch(run_stop(), "stop");
   } else {
     // The running sequence sends this one, too. It may wait for a reading that is held back, or will be,
     // because the node does not answer.
-    const bool held = !link_.online() && env_.bus->holds_back(settings_.node);
-    if (link_.offline() || held) env_.bus->give_up_readings(settings_.node);
-    sampled_.notify_all();
+    const bool held = !link_.online() && context_.env.bus->holds_back(context_.settings.node);
+    if (link_.offline() || held) context_.env.bus->give_up_readings(context_.settings.node);
+    shaft_.sampled().notify_all();
   }
 }
 
@@ -82,15 +82,15 @@ void Axis::begin_stop(StopKind kind, CommandPtr command) {
 /// of the drive's own from limits.velocity.
 Duration Axis::braking_time(StopKind kind) const {
   if (kind != StopKind::quick_stop) return stop_.deceleration();
-  const auto rpm = std::ceil(std::abs(scale_.velocity_to_rpm(settings_.limits.velocity)));
-  return drive_->quick_stop_time(static_cast<int>(rpm)).value_or(stop_.deceleration());
+  const auto rpm = std::ceil(std::abs(context_.scale.velocity_to_rpm(context_.settings.limits.velocity)));
+  return context_.drive->quick_stop_time(static_cast<int>(rpm)).value_or(stop_.deceleration());
 }
 
 /// What the drive may go on with after its command has ended. A command that never started leaves the ramps
 /// of the motion before it in force.
 void Axis::leave_running(const Activity& activity) {
   if (!activity.start.may_run()) return;
-  stop_.unseen_start().left(env_.clock->now());
+  stop_.unseen_start().left(context_.env.clock->now());
   const auto& plan = activity.plan;
   stop_.set_deceleration(
       std::max(plan.deceleration_time, plan.granted.deceleration_time.value_or(Duration{})));
@@ -98,14 +98,14 @@ void Axis::leave_running(const Activity& activity) {
 }
 
 Task<> Axis::run_stop() {
-  if (is_being_opened(env_.bus->port())) {
-    co_await first_attempt_to_open(*env_.bus, *env_.clock);
+  if (is_being_opened(context_.env.bus->port())) {
+    co_await first_attempt_to_open(*context_.env.bus, *context_.env.clock);
     observed_.stop_failed();  // its time is not one of those that the budget promises: there was no port
   }
   const auto confirmed = co_await stop_and_confirm();
   const auto commands = confirmed ? stop_.confirmed() : stop_.failed();
   if (confirmed) {
-    observed_.standstill_confirmed(env_.clock->now());
+    observed_.standstill_confirmed(context_.env.clock->now());
     remember_position();
     for (const auto& command : commands) command->done();
   } else {
@@ -116,7 +116,8 @@ Task<> Axis::run_stop() {
     // owed when it is connected, and comes online once it rests (M4).
     const bool never_heard = !identity_ && confirmed.error().outcome == Outcome::unknown;
     if (!fault_ && !never_heard) fault_ = confirmed.error();
-    log_about_axis(spdlog::level::err, LogKind::stop_unconfirmed, settings_, to_string(confirmed.error()));
+    log_about_axis(spdlog::level::err, LogKind::stop_unconfirmed, context_.settings,
+                   to_string(confirmed.error()));
     for (const auto& command : commands) {
       if (link_.offline())
         command->unknown(confirmed.error());
@@ -134,21 +135,21 @@ void Axis::note_stop_sent(TimePoint end, bool answered) {
   if (!late) return;
   const auto in_ms = [](Duration time) { return std::chrono::duration<double, std::milli>(time).count(); };
   log_about_axis(
-      spdlog::level::warn, LogKind::stop_late, settings_,
+      spdlog::level::warn, LogKind::stop_late, context_.settings,
       fmt::format("{}: a stop frame had gone out {:.1f} ms after its request; the budget promises {:.1f} ms. "
                   "Lost frames, or this computer: relieve it, or raise host_allowance of bus {} (told once)",
-                  settings_.name, in_ms(late->seen), in_ms(late->expected), settings_.bus));
+                  context_.settings.name, in_ms(late->seen), in_ms(late->expected), context_.settings.bus));
 }
 
 Error Axis::not_stopped(StopMachine::Step step, const Result<void>& sent) const {
-  auto cause = error(Reason::not_confirmed, "standstill was not confirmed",
-                     "look at the machine; cut its power if it moves; then reset the axis");
+  auto cause = context_.error(Reason::not_confirmed, "standstill was not confirmed",
+                              "look at the machine; cut its power if it moves; then reset the axis");
   if (step == StopMachine::Step::not_confirmed) return cause;
-  cause = error(Reason::not_confirmed,
-                step == StopMachine::Step::unreachable && !sent
-                    ? "the stop was not acknowledged: " + to_string(sent.error())
-                    : "the drive fell silent before its standstill was confirmed",
-                "look at the machine; a stop is sent as soon as the drive answers");
+  cause = context_.error(Reason::not_confirmed,
+                         step == StopMachine::Step::unreachable && !sent
+                             ? "the stop was not acknowledged: " + to_string(sent.error())
+                             : "the drive fell silent before its standstill was confirmed",
+                         "look at the machine; a stop is sent as soon as the drive answers");
   cause.outcome = Outcome::unknown;
   return cause;
 }
@@ -160,34 +161,36 @@ Task<Result<void>> Axis::stop_and_confirm() {
   for (;;) {
     const auto kind = stop_.next_attempt();
     if (std::exchange(last, kind) != kind) unanswered.reset();
-    const auto sent = co_await drive_->stop(kind);
+    const auto sent = co_await context_.drive->stop(kind);
     // Open loop: a stop without a ramp may have lost steps (M12), also one of which only the reply was lost.
     const bool may_have_come = sent || sent.error().outcome == Outcome::unknown;
-    if (kind == StopKind::quick_stop && may_have_come && !drive_->closed_loop()) lose_trust();
+    if (kind == StopKind::quick_stop && may_have_come && !context_.drive->closed_loop()) lose_trust();
     wake();
-    if (const auto out = drive_->stop_sent_at()) note_stop_sent(*out, sent.has_value());
+    if (const auto out = context_.drive->stop_sent_at()) note_stop_sent(*out, sent.has_value());
     auto step = stop_.sent(answer_of(sent), link_.offline());
     if (step == Step::look) {
-      const auto now = env_.clock->now();
+      const auto now = context_.env.clock->now();
       if (sent) unanswered.reset();
       if (!sent && !unanswered) unanswered = now;
       const auto found = co_await rests_in_time(sent.has_value(), unanswered.value_or(now));
-      step = stop_.looked(found, link_.offline(), settings_.stop_escalation_release);
+      step = stop_.looked(found, link_.offline(), context_.settings.stop_escalation_release);
     }
     switch (step) {
       case Step::send:
       case Step::look:
         break;
       case Step::quicken:
-        log_about_axis(spdlog::level::warn, LogKind::stop_escalated, settings_,
-                       fmt::format("{}: standstill not confirmed in time; quick stop", settings_.name));
+        log_about_axis(
+            spdlog::level::warn, LogKind::stop_escalated, context_.settings,
+            fmt::format("{}: standstill not confirmed in time; quick stop", context_.settings.name));
         break;
       case Step::release:
         log_about_axis(
-            spdlog::level::warn, LogKind::stop_escalated, settings_,
+            spdlog::level::warn, LogKind::stop_escalated, context_.settings,
             fmt::format("{}: standstill not confirmed after a quick stop; releasing the power stage",
-                        settings_.name));
-        if (const auto off = co_await drive_->disable({}); !off) spdlog::error("{}", to_string(off.error()));
+                        context_.settings.name));
+        if (const auto off = co_await context_.drive->disable({}); !off)
+          spdlog::error("{}", to_string(off.error()));
         break;
       case Step::rests:
         co_return Result<void>{};
@@ -202,8 +205,9 @@ Task<Result<void>> Axis::stop_and_confirm() {
 /// After a stop frame, which was acknowledged or not. `since`: the first of those that were not. Undecided:
 /// it moves, and none of them may have arrived.
 Task<RestVerdict> Axis::rests_in_time(bool acknowledged, TimePoint since) {
-  const auto now = env_.clock->now();
-  const auto deadline = since + stop_.patience(settings_.stop_margin, braking_time(StopKind::quick_stop));
+  const auto now = context_.env.clock->now();
+  const auto deadline =
+      since + stop_.patience(context_.settings.stop_margin, braking_time(StopKind::quick_stop));
   poll_fast(now, std::max<Duration>(deadline - now, start_window));
   // Only an axis that is online is polled: not one whose drive was restarted meanwhile.
   if (link_.online()) {
@@ -217,15 +221,17 @@ Task<RestVerdict> Axis::rests_in_time(bool acknowledged, TimePoint since) {
 }
 
 Task<RestVerdict> Axis::standstill_by(bool acknowledged, TimePoint deadline) {
-  const auto since = env_.clock->now();
+  const auto since = context_.env.clock->now();
   StandstillWatch watch(since, deadline);
   while (link_.online() && !stop_.overtaken()) {
-    if (sample_ && !stop_.unseen_start().may_begin()) {
-      const auto found = watch.look(*sample_, tracker_.counter(), drive_->position_window());
+    if (shaft_.sample() && !stop_.unseen_start().may_begin()) {
+      const auto found =
+          watch.look(*shaft_.sample(), shaft_.tracker().counter(), context_.drive->position_window());
       if (found != RestVerdict::undecided) co_return found;
-      if (!acknowledged && sample_->moving && sample_->asked_at >= since) co_return RestVerdict::undecided;
+      if (!acknowledged && shaft_.sample()->moving && shaft_.sample()->asked_at >= since)
+        co_return RestVerdict::undecided;
     }
-    co_await sampled_.wait();
+    co_await shaft_.sampled().wait();
   }
   co_return RestVerdict::moves;
 }
@@ -238,18 +244,19 @@ Task<bool> Axis::standstill_unpolled(TimePoint deadline, bool of_stop) {
   UnpolledStandstill watch(deadline);
   for (;;) {
     const auto begun = stop_.unseen_start().begun();
-    const auto sample = co_await drive_->read_state(TransactionClass::moving_state);
+    const auto sample = co_await context_.drive->read_state(TransactionClass::moving_state);
     if (sample) on_sample(*sample);
     if (another() || stop_.unseen_start().begun() != begun) co_return false;
     auto found = RestVerdict::undecided;
     if (!sample)
       found = watch.silence();
     else if (!stop_.unseen_start().may_begin())
-      found = watch.look(*sample, tracker_.counter(), drive_->position_window());
+      found = watch.look(*sample, shaft_.tracker().counter(), context_.drive->position_window());
     if (found != RestVerdict::undecided) co_return found == RestVerdict::rests;
     // Samples of somebody else who looks do not shorten it.
-    for (const auto until = env_.clock->now() + pause; !another() && env_.clock->now() < until;)
-      co_await sampled_.wait_until(until);
+    for (const auto until = context_.env.clock->now() + pause;
+         !another() && context_.env.clock->now() < until;)
+      co_await shaft_.sampled().wait_until(until);
     if (another()) co_return false;  // another reading might be held back
   }
 }

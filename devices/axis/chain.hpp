@@ -16,7 +16,7 @@ class Axis::Chain {
   ~Chain() {
     --axis_->chains_;
     // The reading that waits since before it is of an axis at work now.
-    axis_->env_.bus->hasten(axis_->settings_.node, TransactionClass::moving_state);
+    axis_->context_.env.bus->hasten(axis_->context_.settings.node, TransactionClass::moving_state);
     axis_->wake();
   }
   Chain(const Chain&) = delete;

@@ -34,7 +34,7 @@ class Axis::Member {
   /// Nothing goes out any more where one of `all` forbids it, nor after `not_after`.
   void tie(std::shared_ptr<const std::vector<MotionGuard>> all, TimePoint not_after);
   /// Where its start has to wait for its turn; nullptr: nowhere.
-  [[nodiscard]] StartTurns* start_turns() const { return axis_->env_.bus->start_turns(); }
+  [[nodiscard]] StartTurns* start_turns() const { return axis_->context_.env.bus->start_turns(); }
   /// Whether it waits there now.
   void waits_for_turn(bool waits);
   /// Makes room at the drive, and the move known to a restart of the daemon, before anything of it is sent.
@@ -58,7 +58,7 @@ class Axis::Member {
   /// Its moment is near: it is loaded, looked at and verified once more, and starts by `latest`.
   void take_up(TimePoint latest);
   /// As Bus::hold().
-  [[nodiscard]] std::shared_ptr<void> hold_bus() const { return axis_->env_.bus->hold(); }
+  [[nodiscard]] std::shared_ptr<void> hold_bus() const { return axis_->context_.env.bus->hold(); }
   /// From now on its start may have been sent.
   void about_to_start();
   /// It is known that it was not.
