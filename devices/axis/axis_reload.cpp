@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "devices/axis/axis.hpp"
-#include "devices/axis/restart_mark.hpp"
 
 namespace axisd {
 
@@ -15,71 +14,68 @@ std::vector<Error> Axis::check_exchange(bool energised) const {
   const auto add = [&](Reason reason, std::string message, std::string remedy) {
     found.push_back(context_.error(reason, std::move(message), std::move(remedy)));
   };
-  if (life_.ends()) add(Reason::reloading, "it is being reloaded already", "wait for it");
-  if (activity_) {
-    const auto& command = activity_->command->value();
-    add(activity_->state == AxisState::standstill ? Reason::busy : Reason::moving,
+  if (sequences_.life().ends()) add(Reason::reloading, "it is being reloaded already", "wait for it");
+  if (execution_.activity()) {
+    const auto& command = execution_.activity()->command->value();
+    add(execution_.activity()->state == AxisState::standstill ? Reason::busy : Reason::moving,
         fmt::format("executes {} {}{}", to_string(command.kind), command.id,
-                    buffer_.empty() ? "" : fmt::format(", and {} more wait for it", buffer_.size())),
+                    execution_.buffer().empty()
+                        ? ""
+                        : fmt::format(", and {} more wait for it", execution_.buffer().size())),
         "wait for its end, or stop it: " + context_.shell("stop"));
-  } else if ((shaft_.sample() && shaft_.sample()->moving && !stop_.owed()) ||
+  } else if ((shaft_.sample() && shaft_.sample()->moving && !stopper_.machine().owed()) ||
              shaft_.terminal_motion().moves()) {
     add(Reason::moving, "the axis moves", "wait for standstill, or stop it: " + context_.shell("stop"));
   }
-  if (stop_.coming()) add(Reason::stopping, "the axis is stopping", "wait for standstill");
-  if (stop_.owed() && !stop_.under_way())
+  if (stopper_.machine().coming()) add(Reason::stopping, "the axis is stopping", "wait for standstill");
+  if (stopper_.machine().owed() && !stopper_.machine().under_way())
     add(Reason::stopping, "a stop is owed to the drive, which was not seen at rest",
         "look at the machine; the stop is the first that the drive gets when it answers");
-  if (power_.owes_release())
+  if (power_.machine().owes_release())
     add(Reason::busy, "the drive is being released, because a lease ended", "wait for it");
-  if (!maintenance_.expired() || users_.use_count() > 1)
+  if (work_.under_way() || work_.used())
     add(Reason::busy, "the drive's parameters, segments or memory are being worked on", "wait for it");
-  if (earlier_.open())
+  if (earlier_.run().open())
     add(Reason::busy, "what became of a command of before the daemon's start is not known yet",
         "wait until the drive has been asked");
   // Nobody would look after a drive that is left, and one that stays is not configured under power (M1).
   if (shaft_.sample() && shaft_.sample()->enabled && (!energised || drift_.drifted()))
     add(Reason::busy,
-        link_.online() ? "its power stage is on" : "its power stage was on when it was last seen",
-        link_.online()
+        connection_.link().online() ? "its power stage is on"
+                                    : "its power stage was on when it was last seen",
+        connection_.link().online()
             ? "disable it first: " + context_.shell("disable")
             : "look at the machine and let the drive answer; or restart the service with this configuration");
   // The one that comes after would take it for energised since ever (M1).
-  if (power_.state() == PowerMachine::State::restarted && shaft_.sample() && shaft_.sample()->enabled)
+  if (power_.machine().state() == PowerMachine::State::restarted && shaft_.sample() &&
+      shaft_.sample()->enabled)
     add(Reason::busy, "its drive was switched off and on, and is energised",
         "enable or disable it first: " + context_.shell("enable"));
-  if (fault_)  // whoever comes after would know nothing of it
-    add(Reason::fault, "in ErrorStop: " + fault_->message, "reset it first: " + context_.shell("reset"));
+  if (execution_.fault())  // whoever comes after would know nothing of it
+    add(Reason::fault, "in ErrorStop: " + execution_.fault()->message,
+        "reset it first: " + context_.shell("reset"));
   return found;
 }
 
 void Axis::retire(bool position_holds) {
-  life_.retire(!link_.offline());
-  link_.explain(context_.reloading());
-  if (context_.terminal_may_void_position() || !position_holds) lose_trust();
-  if (!position_holds && context_.env.persistence != nullptr)
-    forget_position(*context_.env.persistence, context_.settings.name,
-                    power_.state() == PowerMachine::State::restarted);
-  remember_position();
+  sequences_.life().retire(!connection_.link().offline());
+  connection_.link().explain(context_.reloading());
+  if (context_.terminal_may_void_position() || !position_holds) readings_.lose_trust();
+  if (!position_holds) saved_.void_saved_position();
+  saved_.remember_position();
   // By this the axis that comes after it finds a restart of the drive, also where there is no position (M1).
-  const bool keeps_canary = context_.env.persistence != nullptr && link_.is_configured() &&
+  const bool keeps_canary = context_.env.persistence != nullptr && connection_.link().is_configured() &&
                             context_.drive->continuity_mark().has_value();
   if (keeps_canary && shaft_.tracker().trust() == PositionTrust::unknown)
     context_.env.persistence->save_offset(
-        context_.settings.name, offset_record(shaft_.tracker().offset(), PositionTrust::unknown), {});
+        context_.settings.name, saved_.offset_record(shaft_.tracker().offset(), PositionTrust::unknown), {});
   close();
   context_.env.bus->port_changed().notify_all();  // whoever waits for the port looks again
 }
 
 Result<std::shared_ptr<void>> Axis::use() {
-  if (life_.retired()) return fail(context_.reloading());
-  return users_;
-}
-
-void Axis::take_stop(const StopRequest& request, const CommandOptions& options, CommandPtr command) {
-  accept_epoch_ = context_.gate->epoch();
-  context_.gate->stop_served();
-  execute_stop(request, options, std::move(command));
+  if (sequences_.life().retired()) return fail(context_.reloading());
+  return work_.use();
 }
 
 }  // namespace axisd

@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "devices/axis/axis.hpp"
-#include "devices/axis/chain.hpp"
 
 namespace axisd {
 
@@ -25,7 +24,7 @@ class Axis::Member {
   [[nodiscard]] const CommandPtr& command() const { return activity_->command; }
   [[nodiscard]] const Plan& plan() const { return activity_->plan; }
   /// What decides at each bind whether the axis may still move, without those of the others.
-  [[nodiscard]] MotionGuard guard() const { return axis_->guard(*activity_); }
+  [[nodiscard]] MotionGuard guard() const { return axis_->execution_.guard(*activity_); }
   /// Nothing forbids its start, as far as is known without asking the drive.
   [[nodiscard]] bool ready() const;
 
@@ -91,7 +90,7 @@ class Axis::Member {
   void end_aborted(Error cause);
 
  private:
-  [[nodiscard]] bool current() const { return axis_->current(*activity_); }
+  [[nodiscard]] bool current() const { return axis_->execution_.current(*activity_); }
   [[nodiscard]] Error gone() const;
   [[nodiscard]] MotionGuard tied() const;
   Task<Result<DriveSample>> read_state();
@@ -103,7 +102,7 @@ class Axis::Member {
   ActivityPtr activity_;
   std::shared_ptr<const std::vector<MotionGuard>> all_;
   TimePoint not_after_ = TimePoint::max();
-  std::unique_ptr<Chain> chain_;
+  std::unique_ptr<StateReader::Chain> chain_;
   std::unique_ptr<PreparedMove> prepared_;
   std::unique_ptr<LoadedMove> loaded_;
   std::string start_note_;

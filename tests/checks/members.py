@@ -15,7 +15,6 @@ KNOWN = {
     ("api/web/gateway/connection.hpp", "Connection"): 21,
     ("buses/modbus_rtu/rtu_bus.hpp", "RtuBus"): 27,
     ("daemon/store/journal_file.hpp", "JournalFile"): 21,
-    ("devices/axis/axis.hpp", "Axis"): 34,
     ("devices/cia402_eds/simulator.hpp", "StandardDrive"): 43,
     ("devices/yako_rtu/simulator.hpp", "SimulatedDrive"): 36,
     ("devices/yss_c/simulator.hpp", "SimulatedDrive"): 38,

@@ -1,9 +1,11 @@
 // What the axis shows: snapshots, and events where something changed.
+#include "devices/axis/publisher.hpp"
+
 #include <algorithm>
 #include <boost/smart_ptr/make_shared.hpp>
 #include <cmath>
 
-#include "devices/axis/axis.hpp"
+#include "devices/axis/execution.hpp"
 
 namespace axisd {
 
@@ -27,8 +29,30 @@ std::string new_notes(std::string_view before, std::string_view now) {
 
 }  // namespace
 
+Publisher::Publisher(const AxisContext& context, const Shaft& shaft, const LinkMachine& link,
+                     const std::optional<DriveIdentity>& identity, const PowerMachine& power,
+                     const StopMachine& stop, const DriftWatch& drift, const Execution& execution)
+    : context_(context),
+      shaft_(shaft),
+      link_(link),
+      identity_(identity),
+      power_(power),
+      stop_(stop),
+      drift_(drift),
+      execution_(execution),
+      eeprom_budget_(context.settings.limits.eeprom_saves_per_day, {}) {
+  if (context_.env.persistence != nullptr) {
+    const auto& axes = context_.env.persistence->current().axes;
+    if (const auto found = axes.find(context_.settings.name); found != axes.end()) {
+      eeprom_writes_ = found->second.eeprom_writes;
+      eeprom_budget_ = {context_.settings.limits.eeprom_saves_per_day, found->second.eeprom};
+    }
+  }
+  if (const auto before = context_.face->snapshot.load()) revision_ = before->revision;
+}
+
 /// M29: the edge lies between the previous sample and this one.
-void Axis::tell_edges(const DriveSample& before, const DriveSample& now) {
+void Publisher::tell_edges(const DriveSample& before, const DriveSample& now) {
   if (!context_.env.event || (before.inputs == now.inputs && before.outputs == now.outputs)) return;
   const auto tell = [&](const std::vector<TerminalState>& was, const std::vector<TerminalState>& is) {
     for (std::size_t i = 0; i < is.size(); ++i)
@@ -44,7 +68,7 @@ void Axis::tell_edges(const DriveSample& before, const DriveSample& now) {
   tell(context_.terminals.outputs(before.outputs), context_.terminals.outputs(now.outputs));
 }
 
-void Axis::tell_changes(const AxisSnapshot& before, const AxisSnapshot& now) {
+void Publisher::tell_changes(const AxisSnapshot& before, const AxisSnapshot& now) {
   if (!context_.env.event) return;
   if (before.link != now.link)
     context_.env.event(
@@ -64,17 +88,18 @@ void Axis::tell_changes(const AxisSnapshot& before, const AxisSnapshot& now) {
     context_.env.event(context_.settings.name, ConfigurationDrift{.text = now.drift});
 }
 
-MotionCause Axis::motion_cause() const {
+MotionCause Publisher::motion_cause() const {
   if (shaft_.terminal_motion().moves()) return MotionCause::terminal;
   if (!shaft_.sample() || !shaft_.sample()->moving) return MotionCause::none;
-  if (activity_ && activity_->state != AxisState::standstill) return MotionCause::command;
+  if (execution_.activity() && execution_.activity()->state != AxisState::standstill)
+    return MotionCause::command;
   const bool by_terminal =
       shaft_.sample()->mode >= DriveMode::multi_position || context_.terminals.start_active(*shaft_.sample());
   return stop_.left_running() && !by_terminal ? MotionCause::command : MotionCause::unknown;
 }
 
 /// False: nothing was written since the last look. Else the next sample is published, whatever it says.
-bool Axis::note_eeprom_writes() {
+bool Publisher::note_eeprom_writes() {
   const auto written = context_.drive->take_eeprom_writes();
   if (written.saves == 0) return false;
   sampled_revision_ = 0;  // to be published
@@ -90,7 +115,7 @@ bool Axis::note_eeprom_writes() {
 }
 
 /// Of the drive, whatever it saves for.
-Result<void> Axis::permit_saves(std::uint64_t saves) {
+Result<void> Publisher::permit_saves(std::uint64_t saves) {
   note_eeprom_writes();
   const auto now = context_.env.clock->wall(context_.env.clock->now());
   // Kept, so that hours of a clock that was set back are not found in the future again at each start.
@@ -101,7 +126,7 @@ Result<void> Axis::permit_saves(std::uint64_t saves) {
   return permitted;
 }
 
-void Axis::show_position(AxisSnapshot& shown) const {
+void Publisher::show_position(AxisSnapshot& shown) const {
   shown.position = shaft_.tracker().position();
   if (shaft_.sample() && shaft_.sample()->commanded_pulses) {
     const auto ahead =
@@ -121,7 +146,7 @@ void Axis::show_position(AxisSnapshot& shown) const {
 }
 
 /// What the drive tells of itself.
-void Axis::show_sample(AxisSnapshot& shown) const {
+void Publisher::show_sample(AxisSnapshot& shown) const {
   const auto bits = shaft_.sample().value_or(DriveSample{});
   shown.inputs = context_.terminals.inputs(bits.inputs);
   shown.outputs = context_.terminals.outputs(bits.outputs);
@@ -139,7 +164,7 @@ void Axis::show_sample(AxisSnapshot& shown) const {
   shown.sampled.set(bits.asked_at, bits.measured_at, context_.env.clock->wall(bits.measured_at));
 }
 
-void Axis::publish() {
+void Publisher::publish() {
   note_eeprom_writes();
   auto next = boost::make_shared<AxisSnapshot>();
   next->name = context_.settings.name;
@@ -149,12 +174,12 @@ void Axis::publish() {
   next->own_descriptor = context_.settings.own_descriptor;
   next->unit = context_.settings.scale.unit;
   next->simulated = context_.simulated;
-  next->state = state();
+  next->state = execution_.state();
   next->link = link_.shown();
   next->link_error = link_.error();
   next->link_note = context_.drive->link_note();
   next->start_note = context_.drive->no_common_start();
-  next->fault = fault_;
+  next->fault = execution_.fault();
   if (context_.env.holds != nullptr) next->holds = context_.env.holds->all();
   next->inhibited = context_.env.inhibited != nullptr && *context_.env.inhibited;
   next->enabled_by_us = power_.enabled_by_us();
@@ -170,9 +195,9 @@ void Axis::publish() {
     next->lease_holder = lease->holder();
   next->revision = ++revision_;
   next->positive_direction = shaft_.watch().positive();
-  if (activity_) {
-    next->command_id = activity_->command->value().id;
-    if (activity_->plan.target) next->target = activity_->plan.target->position;
+  if (execution_.activity()) {
+    next->command_id = execution_.activity()->command->value().id;
+    if (execution_.activity()->plan.target) next->target = execution_.activity()->plan.target->position;
   }
   show_sample(*next);
   shown_ = next;
@@ -180,6 +205,16 @@ void Axis::publish() {
   context_.face->snapshot.store(next);
   if (before) tell_changes(*before, *next);
   if (context_.env.published) context_.env.published();
+}
+
+bool Publisher::shows_sampled() {
+  return revision_ == sampled_revision_ && !note_eeprom_writes() &&
+         shown_->link_note == context_.drive->link_note() &&
+         shown_->start_note == context_.drive->no_common_start();
+}
+
+void Publisher::show_again(const DriveSample& sample) {
+  shown_->sampled.set(sample.asked_at, sample.measured_at, context_.env.clock->wall(sample.measured_at));
 }
 
 }  // namespace axisd

@@ -1,4 +1,6 @@
 // Stopping: one sequence per axis sends, confirms and escalates (M12 to M14).
+#include "devices/axis/stopper.hpp"
+
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
@@ -7,8 +9,14 @@
 #include <cmath>
 #include <utility>
 
-#include "devices/axis/axis.hpp"
 #include "devices/axis/axis_log.hpp"
+#include "devices/axis/drive_connection.hpp"
+#include "devices/axis/execution.hpp"
+#include "devices/axis/publisher.hpp"
+#include "devices/axis/readings.hpp"
+#include "devices/axis/saved_position.hpp"
+#include "devices/axis/sequences.hpp"
+#include "devices/axis/state_reader.hpp"
 
 namespace axisd {
 
@@ -34,31 +42,27 @@ Task<> first_attempt_to_open(Bus& bus, const Clock& clock) {
 
 }  // namespace
 
-void Axis::revoke_motion() {
-  context_.gate->raise();
-  context_.env.bus->purge_superseded(context_.settings.node, *context_.gate);
+Stopper::Stopper(const AxisContext& context, Sequences& sequences, Shaft& shaft, DriveConnection& connection,
+                 const LinkMachine& link, StateReader& reader, Readings& readings, Execution& execution,
+                 SavedPosition& saved, Publisher& publisher)
+    : context_(context),
+      sequences_(sequences),
+      shaft_(shaft),
+      connection_(connection),
+      link_(link),
+      reader_(reader),
+      readings_(readings),
+      execution_(execution),
+      saved_(saved),
+      publisher_(publisher),
+      stop_(*context.gate, context.env.holds),
+      stopped_(context.env.executor, *context.env.clock),
+      observed_(context.env.stop_delays) {
+  stop_.set_deceleration(
+      context_.planner.braking_time(context_.settings.limits.velocity, stop_.deceleration()));
 }
 
-/// Ends what is being executed. Nothing that was prepared for it is sent any more.
-void Axis::supersede(const Error& cause) {
-  ++accept_epoch_;
-  revoke_motion();
-  if (auto activity = take_activity()) {
-    leave_running(*activity);
-    auto told = cause;
-    const bool enabling =
-        activity->start.is_noted() && activity->command->value().kind == CommandKind::enable;
-    if (activity->start.may_run() || enabling) told.outcome = Outcome::unknown;  // its start may be under way
-    activity->command->abort(std::move(told));
-    drop_buffer(cause);
-  }
-}
-
-void Axis::note_motion_to_stop() {
-  if (activity_ && activity_->state != AxisState::standstill) stop_.found_in_motion();
-}
-
-void Axis::begin_stop(StopKind kind, CommandPtr command) {
+void Stopper::begin_stop(StopKind kind, CommandPtr command) {
   stop_.ask(kind);
   if (command) {
     command->activate();
@@ -68,7 +72,7 @@ void Axis::begin_stop(StopKind kind, CommandPtr command) {
   }
   context_.env.bus->hasten(context_.settings.node, TransactionClass::moving_state);
   if (stop_.begin()) {
-    launch(run_stop(), "stop");
+    sequences_.launch(run_stop(), "stop");
   } else {
     // The running sequence sends this one, too. It may wait for a reading that is held back, or will be,
     // because the node does not answer.
@@ -80,24 +84,13 @@ void Axis::begin_stop(StopKind kind, CommandPtr command) {
 
 /// How long the drive brakes in such a stop, at most: by the motion in progress, or in a quick stop on a ramp
 /// of the drive's own from limits.velocity.
-Duration Axis::braking_time(StopKind kind) const {
+Duration Stopper::braking_time(StopKind kind) const {
   if (kind != StopKind::quick_stop) return stop_.deceleration();
   const auto rpm = std::ceil(std::abs(context_.scale.velocity_to_rpm(context_.settings.limits.velocity)));
   return context_.drive->quick_stop_time(static_cast<int>(rpm)).value_or(stop_.deceleration());
 }
 
-/// What the drive may go on with after its command has ended. A command that never started leaves the ramps
-/// of the motion before it in force.
-void Axis::leave_running(const Activity& activity) {
-  if (!activity.start.may_run()) return;
-  stop_.unseen_start().left(context_.env.clock->now());
-  const auto& plan = activity.plan;
-  stop_.set_deceleration(
-      std::max(plan.deceleration_time, plan.granted.deceleration_time.value_or(Duration{})));
-  if (activity.state != AxisState::standstill) stop_.leave_running();
-}
-
-Task<> Axis::run_stop() {
+Task<> Stopper::run_stop() {
   if (is_being_opened(context_.env.bus->port())) {
     co_await first_attempt_to_open(*context_.env.bus, *context_.env.clock);
     observed_.stop_failed();  // its time is not one of those that the budget promises: there was no port
@@ -106,16 +99,16 @@ Task<> Axis::run_stop() {
   const auto commands = confirmed ? stop_.confirmed() : stop_.failed();
   if (confirmed) {
     observed_.standstill_confirmed(context_.env.clock->now());
-    remember_position();
+    saved_.remember_position();
     for (const auto& command : commands) command->done();
   } else {
     observed_.stop_failed();
     // Whether it arrived is not known: the drive is connected anew, which begins with a stop (M4).
-    if (confirmed.error().outcome == Outcome::unknown) bus_lost(confirmed.error());
+    if (confirmed.error().outcome == Outcome::unknown) connection_.bus_lost(confirmed.error());
     // Nothing that this daemon began can go on in a drive that it has never heard: it gets the stop that is
     // owed when it is connected, and comes online once it rests (M4).
-    const bool never_heard = !identity_ && confirmed.error().outcome == Outcome::unknown;
-    if (!fault_ && !never_heard) fault_ = confirmed.error();
+    const bool never_heard = !connection_.identity() && confirmed.error().outcome == Outcome::unknown;
+    if (!never_heard) execution_.note_fault(confirmed.error());
     log_about_axis(spdlog::level::err, LogKind::stop_unconfirmed, context_.settings,
                    to_string(confirmed.error()));
     for (const auto& command : commands) {
@@ -125,12 +118,12 @@ Task<> Axis::run_stop() {
         command->error(confirmed.error());
     }
   }
-  publish();
+  publisher_.publish();
   stopped_.notify_all();
-  wake();
+  reader_.wake();
 }
 
-void Axis::note_stop_sent(TimePoint end, bool answered) {
+void Stopper::note_stop_sent(TimePoint end, bool answered) {
   const auto late = observed_.stop_sent(end, answered);
   if (!late) return;
   const auto in_ms = [](Duration time) { return std::chrono::duration<double, std::milli>(time).count(); };
@@ -141,7 +134,7 @@ void Axis::note_stop_sent(TimePoint end, bool answered) {
                   context_.settings.name, in_ms(late->seen), in_ms(late->expected), context_.settings.bus));
 }
 
-Error Axis::not_stopped(StopMachine::Step step, const Result<void>& sent) const {
+Error Stopper::not_stopped(StopMachine::Step step, const Result<void>& sent) const {
   auto cause = context_.error(Reason::not_confirmed, "standstill was not confirmed",
                               "look at the machine; cut its power if it moves; then reset the axis");
   if (step == StopMachine::Step::not_confirmed) return cause;
@@ -154,7 +147,7 @@ Error Axis::not_stopped(StopMachine::Step step, const Result<void>& sent) const 
   return cause;
 }
 
-Task<Result<void>> Axis::stop_and_confirm() {
+Task<Result<void>> Stopper::stop_and_confirm() {
   using Step = StopMachine::Step;
   StopKind last = StopKind::none;
   std::optional<TimePoint> unanswered;  // since when stops of that kind are sent without a reply
@@ -164,8 +157,9 @@ Task<Result<void>> Axis::stop_and_confirm() {
     const auto sent = co_await context_.drive->stop(kind);
     // Open loop: a stop without a ramp may have lost steps (M12), also one of which only the reply was lost.
     const bool may_have_come = sent || sent.error().outcome == Outcome::unknown;
-    if (kind == StopKind::quick_stop && may_have_come && !context_.drive->closed_loop()) lose_trust();
-    wake();
+    if (kind == StopKind::quick_stop && may_have_come && !context_.drive->closed_loop())
+      readings_.lose_trust();
+    reader_.wake();
     if (const auto out = context_.drive->stop_sent_at()) note_stop_sent(*out, sent.has_value());
     auto step = stop_.sent(answer_of(sent), link_.offline());
     if (step == Step::look) {
@@ -204,11 +198,11 @@ Task<Result<void>> Axis::stop_and_confirm() {
 
 /// After a stop frame, which was acknowledged or not. `since`: the first of those that were not. Undecided:
 /// it moves, and none of them may have arrived.
-Task<RestVerdict> Axis::rests_in_time(bool acknowledged, TimePoint since) {
+Task<RestVerdict> Stopper::rests_in_time(bool acknowledged, TimePoint since) {
   const auto now = context_.env.clock->now();
   const auto deadline =
       since + stop_.patience(context_.settings.stop_margin, braking_time(StopKind::quick_stop));
-  poll_fast(now, std::max<Duration>(deadline - now, start_window));
+  reader_.poll_fast(now, std::max<Duration>(deadline - now, start_window));
   // Only an axis that is online is polled: not one whose drive was restarted meanwhile.
   if (link_.online()) {
     const auto found = co_await standstill_by(acknowledged, deadline);
@@ -220,7 +214,7 @@ Task<RestVerdict> Axis::rests_in_time(bool acknowledged, TimePoint since) {
   co_return co_await standstill_unpolled(deadline, true) ? RestVerdict::rests : RestVerdict::moves;
 }
 
-Task<RestVerdict> Axis::standstill_by(bool acknowledged, TimePoint deadline) {
+Task<RestVerdict> Stopper::standstill_by(bool acknowledged, TimePoint deadline) {
   const auto since = context_.env.clock->now();
   StandstillWatch watch(since, deadline);
   while (link_.online() && !stop_.overtaken()) {
@@ -238,14 +232,14 @@ Task<RestVerdict> Axis::standstill_by(bool acknowledged, TimePoint deadline) {
 
 /// The same for a node that nobody polls, because it is not (or not yet) online. What its samples tell beside
 /// the standstill is heard nowhere else (M5). `of_stop`: another stop than the one under way ends it.
-Task<bool> Axis::standstill_unpolled(TimePoint deadline, bool of_stop) {
+Task<bool> Stopper::standstill_unpolled(TimePoint deadline, bool of_stop) {
   constexpr auto pause = milliseconds(30);
   const auto another = [&] { return of_stop && stop_.overtaken(); };
   UnpolledStandstill watch(deadline);
   for (;;) {
     const auto begun = stop_.unseen_start().begun();
     const auto sample = co_await context_.drive->read_state(TransactionClass::moving_state);
-    if (sample) on_sample(*sample);
+    if (sample) readings_.on_sample(*sample);
     if (another() || stop_.unseen_start().begun() != begun) co_return false;
     auto found = RestVerdict::undecided;
     if (!sample)

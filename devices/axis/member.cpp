@@ -1,10 +1,10 @@
 // An axis as a member of a group.
+#include "devices/axis/member.hpp"
+
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <utility>
-
-#include "devices/axis/member.hpp"
 
 namespace axisd {
 
@@ -14,60 +14,9 @@ constexpr int attempts = 3;
 
 }  // namespace
 
-Result<Plan> Axis::plan_member(const GroupMemberRequest& request, const CommandOptions& options) {
-  accept_epoch_ = context_.gate->epoch();
-  if (options.buffer_mode == BufferMode::buffered)
-    return fail(context_.error(Reason::not_supported, "a group move cannot be buffered",
-                               "send it when its members rest, with the buffer mode aborting"));
-  Obstacles found;
-  look_at(request, options, found);
-  if (auto permitted = found.verdict(); !permitted) return fail(permitted.error());
-  const auto target =
-      request.position
-          ? context_.target_of(MoveAbsoluteRequest{.position = *request.position}, shaft_.tracker())
-          : shaft_.tracker().plan_relative(request.distance.value_or(0));
-  auto plan = plan_move(target, request.with);
-  if (!plan) return plan;
-  if (request.position) plan->trusted = context_.settings.require_trust;
-  return plan;
-}
-
-/// As a move of its own; and it has to rest.
-void Axis::look_at(const GroupMemberRequest& request, const CommandOptions& options, Obstacles& found) const {
-  if (request.position)
-    look_at(MoveAbsoluteRequest{.position = *request.position, .with = request.with}, options, found);
-  else
-    look_at(MoveRelativeRequest{.distance = request.distance.value_or(0), .with = request.with}, options,
-            found);
-  if (activity_ && activity_->state == AxisState::standstill)
-    found.block(context_.error(Reason::busy, "another command is being executed", "wait for it"));
-  else if (activity_ || stop_.under_way() || (shaft_.sample() && shaft_.sample()->moving))
-    found.block(context_.error(Reason::moving, "a member of a group move has to rest",
-                               "wait for standstill, or halt it"));
-}
-
-Result<CommandPtr> Axis::accept(const GroupMemberRequest&, const CommandOptions&) const {
-  return fail(
-      context_.error(Reason::not_supported, "this is a part of a group move", "send it with MoveGroup"));
-}
-
-Task<> Axis::run_member(ActivityPtr activity, std::int64_t base, TimePoint since, bool there,
-                        std::shared_ptr<std::optional<TimePoint>> arrival) {
-  if (there) {
-    if (!co_await is_no_reboot(activity) || !co_await still_there(activity)) co_return;
-  } else {
-    const auto when = co_await arrived(activity, base, since);
-    if (!when) co_return;
-    *arrival = when;
-  }
-  shaft_.tracker().reached(*activity->plan.target, context_.drive->position_window());
-  remember_position();
-  finish(*activity, [](CommandRecord& command) { command.done(); });
-}
-
 Axis::Member::Member(Axis& axis, const GroupMemberRequest& request, const CommandOptions& options, Plan plan)
     : axis_(&axis),
-      activity_(axis.begin(request, options, AxisState::synchronized_motion, std::move(plan))) {}
+      activity_(axis.acceptance_.begin(request, options, AxisState::synchronized_motion, std::move(plan))) {}
 
 Axis::Member::~Member() = default;
 
@@ -78,19 +27,20 @@ void Axis::Member::let_go() {
 }
 
 bool Axis::Member::ready() const {
-  return current() && axis_->link_.online() && !axis_->link_.bus_loss() &&
-         axis_->context_.env.bus->port().open && !axis_->fault_ && !axis_->context_.drive->in_trouble() &&
+  return current() && axis_->connection_.link().online() && !axis_->connection_.link().bus_loss() &&
+         axis_->context_.env.bus->port().open && !axis_->execution_.fault() &&
+         !axis_->context_.drive->in_trouble() &&
          may_send_alone(guard(), axis_->context_.env.clock->now()) == Verdict::send;
 }
 
 void Axis::Member::wait_for_others(Duration more) {
   const auto latest = std::min(activity_->start_by + more, activity_->options.call_deadline);
-  axis_->start_by(activity_, activity_->waits_since, latest);
+  axis_->starts_.start_by(activity_, activity_->waits_since, latest);
 }
 
 void Axis::Member::waits_for_turn(bool waits) {
   waits ? activity_->start.queue() : activity_->start.has_turn();
-  if (!waits) axis_->had_turn_ = axis_->context_.env.clock->now();
+  if (!waits) axis_->starts_.note_turn();
 }
 
 void Axis::Member::tie(std::shared_ptr<const std::vector<MotionGuard>> all, TimePoint not_after) {
@@ -113,10 +63,10 @@ Error Axis::Member::gone() const {
   if (verdict == Verdict::lease_lost)
     return axis_->context_.error(Reason::lease_lost, "the lease is over", "acquire a lease again");
   if (verdict == Verdict::expired && axis_->context_.env.clock->now() > activity_->start_by)
-    return axis_->late(*activity_, {});
+    return axis_->starts_.late(*activity_, {});
   if (verdict == Verdict::expired)
     return axis_->context_.error(Reason::expired, "the request's validity has passed", "repeat it");
-  if (axis_->link_.bus_loss()) return *axis_->link_.bus_loss();
+  if (axis_->connection_.link().bus_loss()) return *axis_->connection_.link().bus_loss();
   if (!axis_->context_.env.bus->port().open)
     return axis_->context_.error(Reason::bus_down, "the port was lost before the start", "check the adapter");
   return axis_->context_.error(Reason::superseded, "a stop came before the start");
@@ -126,13 +76,14 @@ Error Axis::Member::gone() const {
 Task<Result<void>> Axis::Member::note() {
   auto& axis = *axis_;
   if (!ready()) co_return axisd::fail(gone());
-  if (auto seen = co_await axis.look(axis.context_.settings.reboot_guard); !seen) co_return seen;
+  if (auto seen = co_await axis.reader_.look(axis.context_.settings.reboot_guard); !seen) co_return seen;
   if (!ready()) co_return axisd::fail(gone());
-  if (auto aimed = axis.aim(*activity_); !aimed) co_return aimed;
-  if (auto room = co_await axis.make_room(activity_); !room) co_return room;
+  if (auto aimed = axis.motion_.aim().aim(*activity_); !aimed) co_return aimed;
+  if (auto room = co_await axis.motion_.aim().make_room(activity_); !room) co_return room;
   if (!ready()) co_return axisd::fail(gone());
   const auto profile = profile_of(activity_->plan);
-  if (!co_await axis.noted(activity_, axis.note_of(*activity_, axis.context_.drive->marks_until(profile))))
+  if (!co_await axis.starts_.noted(
+          activity_, axis.starts_.note_of(*activity_, axis.context_.drive->marks_until(profile))))
     co_return axisd::fail(gone());
   co_return Result<void>{};
 }
@@ -140,7 +91,7 @@ Task<Result<void>> Axis::Member::note() {
 Task<Result<void>> Axis::Member::load() {
   auto& axis = *axis_;
   if (!ready()) co_return axisd::fail(gone());
-  chain_ = std::make_unique<Chain>(axis);
+  chain_ = std::make_unique<StateReader::Chain>(axis.reader_);
   aim();
   if (there_) co_return Result<void>{};
   const auto profile = profile_of(activity_->plan);
@@ -181,14 +132,14 @@ Task<Result<DriveSample>> Axis::Member::read_state() {
 Task<Result<void>> Axis::Member::look() {
   const auto sample = co_await read_state();
   if (!sample) co_return axisd::fail(sample.error());
-  axis_->on_sample(*sample);
+  axis_->readings_.on_sample(*sample);
   if (!ready()) co_return axisd::fail(gone());
   const bool was_there = there_;
   aim();
   if (was_there && !there_)
     co_return axisd::fail(axis_->context_.error(Reason::moving, "the axis left its position before the start",
                                                 "repeat the move"));
-  if (auto way = axis_->check_way(*activity_); !way) co_return way;
+  if (auto way = axis_->motion_.aim().check_way(*activity_); !way) co_return way;
   co_return judge(*sample);
 }
 
@@ -215,7 +166,7 @@ Result<void> Axis::Member::judge(const DriveSample& sample) const {
 Task<Result<void>> Axis::Member::verify() {
   if (!loaded_ || there_) co_return Result<void>{};
   auto verified = co_await loaded_->verify();
-  if (verified) axis_->continuity_.proven(axis_->context_.env.clock->now());
+  if (verified) axis_->reader_.continuity().proven(axis_->context_.env.clock->now());
   co_return verified;
 }
 
@@ -224,12 +175,12 @@ void Axis::Member::set_down(TimePoint expires) {
   loaded_.reset();
   chain_.reset();
   activity_->start.set_down();
-  axis_->start_by(activity_, axis_->context_.env.clock->now(), expires);
+  axis_->starts_.start_by(activity_, axis_->context_.env.clock->now(), expires);
 }
 
 void Axis::Member::take_up(TimePoint latest) {
   activity_->start.take_up();
-  axis_->start_by(activity_, axis_->context_.env.clock->now(), latest);
+  axis_->starts_.start_by(activity_, axis_->context_.env.clock->now(), latest);
 }
 
 /// Where something else could have turned the shaft meanwhile: looks once more, right before the trigger.
@@ -248,7 +199,8 @@ Task<Result<TimePoint>> Axis::Member::trigger(TimePoint not_after) {
   for (int attempt = 1;; ++attempt) {
     const auto seen_until = co_await look_again();
     if (!seen_until) co_return seen_until;
-    activity_->number = axis_->stop_.unseen_start().sending(base_, axis_->context_.env.clock->now());
+    activity_->number =
+        axis_->stopper_.machine().unseen_start().sending(base_, axis_->context_.env.clock->now());
     auto triggered = co_await loaded_->trigger(std::min(*seen_until, not_after));
     const bool grown_old = !triggered && triggered.error().reason == Reason::expired &&
                            axis_->context_.env.clock->now() < std::min(tied().not_after, not_after);
@@ -258,23 +210,24 @@ Task<Result<TimePoint>> Axis::Member::trigger(TimePoint not_after) {
 
 void Axis::Member::about_to_start() {
   activity_->start.about_to_start();
-  activity_->number = axis_->stop_.unseen_start().sending(base_, axis_->context_.env.clock->now());
+  activity_->number =
+      axis_->stopper_.machine().unseen_start().sending(base_, axis_->context_.env.clock->now());
 }
 
 void Axis::Member::not_started() {
   activity_->start.not_started();
-  axis_->stop_.unseen_start().not_sent(activity_->number);
+  axis_->stopper_.machine().unseen_start().not_sent(activity_->number);
 }
 
 void Axis::Member::started(TimePoint at) {
-  axis_->stop_.unseen_start().sent(activity_->number, axis_->context_.env.clock->now());
+  axis_->stopper_.machine().unseen_start().sent(activity_->number, axis_->context_.env.clock->now());
   started_at_ = at;
   activity_->start.begun();
-  axis_->watch_speed(SpeedWatch::Event::begun);
-  axis_->continuity_.proven(axis_->context_.env.clock->now());  // the canary was part of its start
+  axis_->readings_.watch_speed(SpeedWatch::Event::begun);
+  axis_->reader_.continuity().proven(axis_->context_.env.clock->now());  // the canary was part of its start
   axis_->shaft_.tracker().forget_base();
   activity_->command->activate();
-  axis_->publish();
+  axis_->publisher_.publish();
 }
 
 Duration Axis::Member::unseen_for() const {
@@ -286,18 +239,18 @@ Duration Axis::Member::unseen_for() const {
 
 Task<Result<void>> Axis::Member::look_after() {
   // As often as polling would.
-  if (axis_->continuity_.state(axis_->context_.env.clock->now()) >= Continuity::State::due) {
-    const auto proof = co_await axis_->prove_continuity(TransactionClass::motion);
-    if (!proof && proof.error().reason == Reason::rebooted && axis_->link_.online())
-      axis_->on_reboot(proof.error());
+  if (axis_->reader_.continuity().state(axis_->context_.env.clock->now()) >= Continuity::State::due) {
+    const auto proof = co_await axis_->reader_.prove_continuity(TransactionClass::motion);
+    if (!proof && proof.error().reason == Reason::rebooted && axis_->connection_.link().online())
+      axis_->connection_.on_reboot(proof.error());
     if (!current()) co_return axisd::fail(gone());
   }
   const auto sample = co_await read_state();
   if (!current()) co_return axisd::fail(gone());
   if (sample)
-    axis_->on_sample(*sample);
-  else if (axis_->link_.online())
-    axis_->go_offline(sample.error());
+    axis_->readings_.on_sample(*sample);
+  else if (axis_->connection_.link().online())
+    axis_->connection_.go_offline(sample.error());
   if (!ready()) co_return axisd::fail(gone());
   co_return Result<void>{};
 }
@@ -308,12 +261,12 @@ void Axis::Member::follow() {
   if (!current()) return;
   if (there_) activity_->command->activate();
   const auto since = started_at_.value_or(axis.context_.env.clock->now());
-  axis.launch(axis.run_member(activity_, base_, since, there_, arrived_), "group move");
+  axis.sequences_.launch(axis.motion_.run_member(activity_, base_, since, there_, arrived_), "group move");
 }
 
 Task<> Axis::Member::follow_up() {
   // Not into what the axis was told after it.
-  const bool others = axis_->activity_ && axis_->activity_ != activity_;
+  const bool others = axis_->execution_.activity() && axis_->execution_.activity() != activity_;
   if (loaded_ && started_at_ && !others) co_await loaded_->follow_up();
 }
 
@@ -328,29 +281,29 @@ void Axis::Member::end_aborted(Error cause) { end(std::move(cause), true); }
 void Axis::Member::end(Error cause, bool aborted) {
   auto& axis = *axis_;
   chain_.reset();
-  if (axis.activity_ != activity_) return;  // something else ended it, with what that needs
+  if (axis.execution_.activity() != activity_) return;  // something else ended it, with what that needs
   const bool own =
       cause.where.bus == axis.context_.settings.bus && cause.where.node == axis.context_.settings.node;
   if (own && cause.reason == Reason::expired && axis.context_.env.clock->now() > activity_->start_by)
-    cause = axis.late(*activity_, cause);
-  if (!aborted && own && cause.reason == Reason::rebooted) return axis.on_reboot(cause);
-  if (!aborted && own && cause.reason == Reason::terminal) return axis.on_turned_by_power(cause);
+    cause = axis.starts_.late(*activity_, cause);
+  if (!aborted && own && cause.reason == Reason::rebooted) return axis.connection_.on_reboot(cause);
+  if (!aborted && own && cause.reason == Reason::terminal) return axis.power_.on_turned_by_power(cause);
   const bool unknown = !aborted && cause.outcome == Outcome::unknown && activity_->start.may_run();
-  axis.revoke_motion();
+  axis.execution_.revoke_motion();
   if (activity_->start.may_run()) {
     // The stop of one that may move goes out whatever is known of its start.
     axis.shaft_.tracker().forget_base();
-    axis.leave_running(*activity_);
-    axis.note_motion_to_stop();
+    axis.execution_.leave_running(*activity_);
+    axis.execution_.note_motion_to_stop();
     if (unknown) {
-      ++axis.unknown_starts_.unresolved;
-      if (!axis.fault_) axis.fault_ = cause;
+      axis.motion_.follower().count_unresolved();
+      axis.execution_.note_fault(cause);
     }
-    axis.begin_stop(StopKind::stop, nullptr);
+    axis.stopper_.begin_stop(StopKind::stop, nullptr);
     tell_part(*activity_, cause);
     cause.outcome = Outcome::unknown;  // also where nobody has heard yet whether it had started
   }
-  axis.finish(*activity_, [&](CommandRecord& command) {
+  axis.execution_.finish(*activity_, [&](CommandRecord& command) {
     if (unknown)
       command.unknown(std::move(cause));
     else

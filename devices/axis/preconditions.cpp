@@ -1,5 +1,7 @@
 // Preconditions of requests: each is looked at in one place, for refusals and for explanations. Nothing here
 // waits or touches the wire.
+#include "devices/axis/preconditions.hpp"
+
 #include <fmt/format.h>
 
 #include <cmath>
@@ -7,8 +9,11 @@
 #include <utility>
 
 #include "buses/seconds.hpp"
-#include "devices/axis/axis.hpp"
+#include "devices/axis/drift_check.hpp"
+#include "devices/axis/drive_work.hpp"
+#include "devices/axis/execution.hpp"
 #include "devices/axis/power_wait.hpp"
+#include "devices/axis/start_wait.hpp"
 
 namespace axisd {
 
@@ -26,15 +31,16 @@ std::string bare_text(const Error& why, const std::string& axis) {
 
 }  // namespace
 
-std::vector<Obstacle> Axis::explain(const std::optional<Action>& action,
-                                    const CommandOptions& options) const {
+std::vector<Obstacle> Preconditions::explain(const std::optional<Action>& action,
+                                             const CommandOptions& options) const {
   Obstacles found;
   const bool never_waits = action && std::holds_alternative<DisableRequest>(*action);
   const bool has_id = !action || !options.request_id.empty();
   const auto doubt = never_waits || !has_id ? std::nullopt : context_.env.book->doubt(context_.settings.name);
   const bool told_behind = context_.env.state_unaccepted != nullptr && *context_.env.state_unaccepted;
   if (doubt && !told_behind) found.block(*doubt);
-  const bool for_power = action && buffer_.empty() && waits_for_power(activity_, *action);
+  const bool for_power =
+      action && execution_.buffer().empty() && waits_for_power(execution_.activity(), *action);
   if (action && (options.buffer_mode == BufferMode::buffered || for_power) && !never_waits) {
     look_at_buffered(*action, options, found);
   } else if (action) {
@@ -47,7 +53,7 @@ std::vector<Obstacle> Axis::explain(const std::optional<Action>& action,
   return std::move(found).all();
 }
 
-void Axis::look_at_options(const CommandOptions& options, Obstacles& found) const {
+void Preconditions::look_at_options(const CommandOptions& options, Obstacles& found) const {
   if (options.not_after <= context_.env.clock->now())
     found.block(context_.error(Reason::expired, "the request's validity has passed",
                                "repeat it with a later not_after"));
@@ -62,14 +68,14 @@ void Axis::look_at_options(const CommandOptions& options, Obstacles& found) cons
 }
 
 /// Everybody's stop counts: each who holds has to let go (M14).
-void Axis::look_at_holds(const CommandOptions& options, Obstacles& found) const {
-  if (unheld()) return;
+void Preconditions::look_at_holds(const CommandOptions& options, Obstacles& found) const {
+  if (!stop_.held()) return;
   const auto& holds = context_.env.holds->all();
   found.block(context_.error(Reason::stopping, "a stop is held by " + text_of(holds),
                              how_to_release(holds, context_.settings.name, options.client)));
 }
 
-void Axis::look_at_link(Obstacles& found) const {
+void Preconditions::look_at_link(Obstacles& found) const {
   if (life_.retired()) return found.block(context_.reloading());
   if (!link_.online() && !link_.offline()) {
     auto cause = context_.error(Reason::configuring, "the drive is being identified and configured", "wait");
@@ -122,19 +128,20 @@ void Axis::look_at_link(Obstacles& found) const {
                        "look at the machine; the stop is the first that the drive gets when it answers"));
 }
 
-Result<void> Axis::check_online() const {
+Result<void> Preconditions::check_online() const {
   Obstacles found;
   look_at_link(found);
   return found.verdict();
 }
 
-void Axis::look_at_fault(Obstacles& found) const {
-  if (!fault_) return;
-  auto cause = *fault_;
-  cause.message = fmt::format("{}: in ErrorStop: {}", context_.settings.name, fault_->message);
-  cause.reason = fault_->reason == Reason::alarm ? Reason::alarm : Reason::fault;
-  if (fault_->outcome == Outcome::unknown) cause.message += "; what the drive did of it is unknown";
-  const auto reset = fault_->outcome == Outcome::unknown
+void Preconditions::look_at_fault(Obstacles& found) const {
+  if (!execution_.fault()) return;
+  auto cause = *execution_.fault();
+  cause.message = fmt::format("{}: in ErrorStop: {}", context_.settings.name, execution_.fault()->message);
+  cause.reason = execution_.fault()->reason == Reason::alarm ? Reason::alarm : Reason::fault;
+  if (execution_.fault()->outcome == Outcome::unknown)
+    cause.message += "; what the drive did of it is unknown";
+  const auto reset = execution_.fault()->outcome == Outcome::unknown
                          ? context_.shell("reset") + ", which reads the drive back"
                          : context_.shell("reset");
   const bool said = cause.remedy.find("reset the axis") != cause.remedy.npos;
@@ -146,13 +153,13 @@ void Axis::look_at_fault(Obstacles& found) const {
   found.block(std::move(cause));
 }
 
-void Axis::look_at_maintenance(Obstacles& found) const {
-  if (!maintenance_.expired())
+void Preconditions::look_at_maintenance(Obstacles& found) const {
+  if (work_.under_way())
     found.block(
         context_.error(Reason::busy, "the drive's parameters or memory are being written", "wait for it"));
 }
 
-void Axis::look_at_readiness(const CommandOptions& options, Obstacles& found) const {
+void Preconditions::look_at_readiness(const CommandOptions& options, Obstacles& found) const {
   if (life_.retired()) return found.block(context_.reloading());
   look_at_options(options, found);
   // Stops overtake what waits for the core: their order is that in which they arrived (M14).
@@ -161,7 +168,7 @@ void Axis::look_at_readiness(const CommandOptions& options, Obstacles& found) co
                                "send a new request"));
   // A stop that the core has not seen yet comes before everything that is accepted now.
   look_at_holds(options, found);
-  if (unheld() && stop_.forbids_motion())
+  if (!stop_.held() && stop_.forbids_motion())
     found.block(context_.error(Reason::stopping, "the axis is stopping", "wait for standstill"));
   look_at_fault(found);
   look_at_maintenance(found);
@@ -177,14 +184,15 @@ void Axis::look_at_readiness(const CommandOptions& options, Obstacles& found) co
   look_at_link(found);
 }
 
-void Axis::look_at_motion(const CommandOptions& options, Obstacles& found) const {
+void Preconditions::look_at_motion(const CommandOptions& options, Obstacles& found) const {
   if (context_.env.inhibited != nullptr && *context_.env.inhibited)
     found.block(context_.error(Reason::inhibited, "StopAll holds the machine",
                                "release it: axisctl release-stop --all"));
   if (context_.env.state_unaccepted != nullptr && *context_.env.state_unaccepted)
     found.block(**context_.env.state_unaccepted);
   look_at_readiness(options, found);
-  const auto executed = activity_ ? std::optional(activity_->command->value().kind) : std::nullopt;
+  const auto executed =
+      execution_.activity() ? std::optional(execution_.activity()->command->value().kind) : std::nullopt;
   if (executed == CommandKind::enable && options.buffer_mode == BufferMode::buffered)
     found.note(context_.error(Reason::disabled, "the axis is being enabled", "the start waits for that"));
   else if (executed == CommandKind::enable)
@@ -210,7 +218,8 @@ void Axis::look_at_motion(const CommandOptions& options, Obstacles& found) const
 }
 
 /// The drive decides what an active terminal does to a start: worth knowing, but not refused for.
-void Axis::look_at_holding_terminals(std::span<const std::string_view> functions, Obstacles& found) const {
+void Preconditions::look_at_holding_terminals(std::span<const std::string_view> functions,
+                                              Obstacles& found) const {
   if (!shaft_.sample() || !link_.online()) return;
   for (const auto& input : context_.settings.inputs)
     if (std::ranges::find(functions, input.function) != functions.end() &&
@@ -223,7 +232,7 @@ void Axis::look_at_holding_terminals(std::span<const std::string_view> functions
 }
 
 /// What forbids some motions and permits others.
-void Axis::look_at_what_forbids_some(Obstacles& found) const {
+void Preconditions::look_at_what_forbids_some(Obstacles& found) const {
   if (shaft_.tracker().trust() == PositionTrust::unknown &&
       (context_.settings.require_trust || context_.settings.limits.position_minimum))
     found.note(context_.not_trusted(
@@ -236,23 +245,26 @@ void Axis::look_at_what_forbids_some(Obstacles& found) const {
   if (auto possible = context_.check_velocity_mode(); !possible) found.note(possible.error());
 }
 
-void Axis::look_at_direction(bool positive, Obstacles& found) const {
+void Preconditions::look_at_direction(bool positive, Obstacles& found) const {
   if (shaft_.limit_active(positive)) found.block(context_.direction_blocked(positive));
 }
 
 /// M9: a start that is accepted waits for the end of what moves.
-void Axis::look_at_present_motion(Obstacles& found) const {
+void Preconditions::look_at_present_motion(Obstacles& found) const {
   if (found.blocked()) return;
-  const bool moves = (activity_ && activity_->state != AxisState::standstill) || stop_.under_way() ||
+  const bool moves = (execution_.activity() && execution_.activity()->state != AxisState::standstill) ||
+                     stop_.under_way() ||
                      (shaft_.sample() && shaft_.sample()->moving && !shaft_.terminal_motion().moves());
-  const auto executed = activity_ ? fmt::format("{} {}", to_string(activity_->command->value().kind),
-                                                activity_->command->value().id)
-                                  : std::string();
+  const auto executed = execution_.activity()
+                            ? fmt::format("{} {}", to_string(execution_.activity()->command->value().kind),
+                                          execution_.activity()->command->value().id)
+                            : std::string();
   if (moves)
-    found.note(context_.error(Reason::moving, activity_ ? "the axis moves: " + executed : "the axis moves",
-                              activity_ ? "that is halted and ends Aborted; the start waits for standstill"
-                                        : "the start waits for standstill"));
-  else if (activity_)
+    found.note(context_.error(
+        Reason::moving, execution_.activity() ? "the axis moves: " + executed : "the axis moves",
+        execution_.activity() ? "that is halted and ends Aborted; the start waits for standstill"
+                              : "the start waits for standstill"));
+  else if (execution_.activity())
     found.note(
         context_.error(Reason::busy, "another command is being executed: " + executed, "it ends Aborted"));
 }
@@ -260,11 +272,11 @@ void Axis::look_at_present_motion(Obstacles& found) const {
 /// Its start waits for those of others on its line: one that could not be in time is told so at once (M31).
 /// Who started lately leaves the last third of that time to the others. What was buffered was accepted
 /// before.
-void Axis::look_at_line(Obstacles& found) const {
+void Preconditions::look_at_line(Obstacles& found) const {
   const auto* turns = context_.env.bus->start_turns();
-  if (turns == nullptr || buffer_.starts() || found.blocked()) return;
+  if (turns == nullptr || execution_.buffer().starts() || found.blocked()) return;
   const auto wait = turns->expected_wait();
-  const bool lately = context_.env.clock->now() - had_turn_ < context_.settings.start_within;
+  const bool lately = context_.env.clock->now() - starts_.had_turn() < context_.settings.start_within;
   const auto most = lately ? context_.settings.start_within / 2 : context_.settings.start_within * 3 / 4;
   const auto in_ms = std::chrono::round<std::chrono::milliseconds>(wait).count();
   if (wait > most)
@@ -279,144 +291,35 @@ void Axis::look_at_line(Obstacles& found) const {
                               fmt::format("it waits for about {} ms", in_ms)));
 }
 
-void Axis::look_at_target(const PositionTracker::Target& target, Obstacles& found) const {
+void Preconditions::look_at_target(const PositionTracker::Target& target, Obstacles& found) const {
   context_.planner.check_move(target, shaft_.tracker(), found);
   if (target.counter != shaft_.tracker().counter())
     look_at_direction(context_.planner.positive(target, shaft_.tracker()), found);
 }
 
-void Axis::look_at(const EnableRequest& /*request*/, const CommandOptions& options, Obstacles& found) const {
-  look_at_readiness(options, found);
-  // A drive that turns while it is being enabled was moved by that, as far as can be told.
-  if (!at_rest()) found.block(context_.error(Reason::moving, "the axis moves", "wait for standstill"));
-  if (activity_ && activity_->state == AxisState::standstill)
-    found.block(context_.error(Reason::busy, "another command is being executed", "wait for it"));
-  static constexpr std::string_view releasing[] = {"motor_free"};
-  look_at_holding_terminals(releasing, found);
+Result<void> Preconditions::check_journal() const {
+  const auto trouble = context_.env.book->trouble();
+  if (!trouble) return {};
+  auto cause =
+      context_.error(Reason::storage, "nothing new is started: " + trouble->message, trouble->remedy);
+  cause.where.native_code = trouble->where.native_code;
+  return fail(std::move(cause));
 }
 
-/// Also while the drive is not configured: some of its configuration is only written while it is released.
-void Axis::look_at(const DisableRequest& /*request*/, const CommandOptions& /*options*/,
-                   Obstacles& found) const {
-  if (link_.offline()) look_at_link(found);
+Result<void> Preconditions::check_lease(const Requester& requester) const {
+  const auto allowed =
+      context_.env.leases->check(context_.settings.name, requester, context_.env.clock->now());
+  if (allowed) return {};
+  return fail(context_.error(allowed.error().reason, allowed.error().message, allowed.error().remedy));
 }
 
-void Axis::look_at(const HomeRequest& /*request*/, const CommandOptions& options, Obstacles& found) const {
-  look_at_motion(options, found);
-  if (!context_.settings.homing) {
-    found.block(context_.error(Reason::not_supported, "no homing is configured",
-                               "add homing: to the axis in the YAML"));
-  } else if (shaft_.on_homing_switch() && !context_.settings.homing->backoff) {
-    found.block(context_.error(Reason::limit_switch,
-                               fmt::format("the {} switch is already active", context_.homing_switch()),
-                               "move away from it, or configure homing: { backoff: ... }"));
-  }
-  look_at_present_motion(found);
-  look_at_line(found);
-}
-
-void Axis::look_at(const MoveAbsoluteRequest& request, const CommandOptions& options,
-                   Obstacles& found) const {
-  look_at_motion(options, found);
-  const bool number = std::isfinite(request.position);
-  if (!number)
-    found.block(
-        context_.error(Reason::invalid_argument, "the position is not a number", "give a finite position"));
-  const bool lost = context_.settings.require_trust && shaft_.tracker().trust() == PositionTrust::unknown;
-  if (lost) found.block(context_.not_trusted("the position is unknown"));
-  context_.planner.check_profile(context_.velocity_of(request.with), request.with, found);
-  if (number && !lost) look_at_target(context_.target_of(request, shaft_.tracker()), found);
-  look_at_present_motion(found);
-  look_at_line(found);
-}
-
-void Axis::look_at(const MoveRelativeRequest& request, const CommandOptions& options,
-                   Obstacles& found) const {
-  look_at_motion(options, found);
-  const bool number = std::isfinite(request.distance);
-  if (!number)
-    found.block(
-        context_.error(Reason::invalid_argument, "the distance is not a number", "give a finite distance"));
-  if ((activity_ && activity_->state != AxisState::standstill) || stop_.under_way() ||
-      (shaft_.sample() && shaft_.sample()->moving))
-    found.block(context_.error(Reason::moving,
-                               "a relative move needs standstill: its base would be uncertain",
-                               "wait for standstill, or move to an absolute position"));
-  const bool limited = context_.settings.limits.position_minimum.has_value();
-  if (number && limited && shaft_.tracker().trust() == PositionTrust::unknown &&
-      std::abs(request.distance) > context_.settings.jog_travel) {
-    auto lost = context_.not_trusted("the position is unknown, so limits cannot be kept");
-    lost.remedy += "; shorter moves are bounded by jog_travel";
-    lost.permitted = Range{.minimum = -context_.settings.jog_travel,
-                           .maximum = context_.settings.jog_travel,
-                           .unit = context_.settings.scale.unit};
-    found.block(std::move(lost));
-  }
-  context_.planner.check_profile(context_.velocity_of(request.with), request.with, found);
-  if (number) look_at_target(shaft_.tracker().plan_relative(request.distance), found);
-  look_at_line(found);
-}
-
-void Axis::look_at_velocity(double velocity, const MotionValues& with, bool jog, Obstacles& found) const {
-  found.block_on(context_.check_velocity_mode());
-  context_.planner.check_profile(velocity, with, found);
-  if (!std::isfinite(velocity) || velocity == 0) return;
-  look_at_direction(velocity > 0, found);
-  const auto end = end_of_velocity(velocity > 0, jog);
-  found.block_on(end);
-  if (end && *end) context_.planner.check_move(**end, shaft_.tracker(), found);
-}
-
-void Axis::look_at(const MoveVelocityRequest& request, const CommandOptions& options,
-                   Obstacles& found) const {
-  look_at_motion(options, found);
-  if (request.hold && renews(request, options)) return;
-  look_at_velocity(request.velocity, request.with, false, found);
-  look_at_present_motion(found);
-  look_at_line(found);
-}
-
-void Axis::look_at(const JogRequest& request, const CommandOptions& options, Obstacles& found) const {
-  look_at_motion(options, found);
-  if (renews(request, options)) return;
-  look_at_velocity(request.velocity, request.with, true, found);
-  look_at_present_motion(found);
-  look_at_line(found);
-}
-
-void Axis::look_at(const ResetRequest& /*request*/, const CommandOptions& options, Obstacles& found) const {
-  look_at_options(options, found);
-  look_at_link(found);
-  look_at_maintenance(found);
-  if (stop_.under_way())
-    found.block(context_.error(Reason::stopping, "the axis is stopping", "wait for standstill"));
-  if (activity_)
-    found.block(context_.error(Reason::busy, "another command is being executed", "wait for it"));
-  if (!shaft_.sample() || shaft_.sample()->alarm_code == 0) return;
-  // All others may have lost their cause and wait for this: the drive says whether they have.
-  const auto* spec = find_alarm(*context_.descriptor, shaft_.sample()->alarm_code);
-  if (spec != nullptr && spec->reset == AlarmReset::power_cycle)
-    found.block(context_.alarm_error(shaft_.sample()->alarm_code, "only a power cycle ends"));
-}
-
-void Axis::look_at(const SetPositionRequest& request, const CommandOptions& options, Obstacles& found) const {
-  look_at_readiness(options, found);
-  if (activity_ || stop_.under_way() || (shaft_.sample() && shaft_.sample()->moving))
-    found.block(
-        context_.error(Reason::moving, "the position can only be set at standstill", "wait for standstill"));
-  const bool number = context_.scale.checked_pulses(request.position).has_value();
-  if (number && absolute_segments_ && !context_.is_from_home(shaft_.tracker().offset_for(request.position)))
-    found.block(
-        context_.error(Reason::not_supported,
-                       "the drive's absolute segments count from home: another position would not move them",
-                       "home the axis instead: " + context_.shell("home")));
-  // A released motor can be turned by hand: its position would be lost again at once (M20).
-  if (shaft_.sample() && !shaft_.sample()->enabled && !context_.counts_while_released())
-    found.block(context_.error(Reason::disabled, "the power stage is off, so the position would not hold",
-                               "enable the axis first: " + context_.shell("enable")));
-  if (!number)
-    found.block(context_.error(Reason::invalid_argument, "the position is not a usable number",
-                               "give a finite position"));
+/// It arrived longer ago than it may wait, or its caller has given up. What is buffered may wait.
+bool Preconditions::too_late(const CommandOptions& options) const {
+  if (options.buffer_mode == BufferMode::buffered && (execution_.buffer().starts() || execution_.activity()))
+    return false;
+  const auto now = context_.env.clock->now();
+  return now > options.call_deadline ||
+         (options.arrived != TimePoint{} && now > options.arrived + context_.settings.start_within);
 }
 
 }  // namespace axisd

@@ -1,12 +1,19 @@
 // From the acknowledged start of a motion to its end: MotionMachine and StartReadback judge the readings, and
 // what follows from that is done here.
+#include "devices/axis/motion_follower.hpp"
+
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cstdlib>
 #include <utility>
 
-#include "devices/axis/axis.hpp"
+#include "devices/axis/drive_connection.hpp"
+#include "devices/axis/execution.hpp"
+#include "devices/axis/publisher.hpp"
+#include "devices/axis/readings.hpp"
+#include "devices/axis/state_reader.hpp"
+#include "devices/axis/stopper.hpp"
 
 namespace axisd {
 
@@ -42,7 +49,8 @@ bool has_come(std::int64_t counter, std::int64_t base, std::int64_t target, std:
 
 /// When a motion was read at rest at its target, and not too fast, by the drive that began it. Nothing: the
 /// activity has ended otherwise.
-Task<std::optional<TimePoint>> Axis::arrived(ActivityPtr activity, std::int64_t base, TimePoint since) {
+Task<std::optional<TimePoint>> MotionFollower::arrived(ActivityPtr activity, std::int64_t base,
+                                                       TimePoint since) {
   activity->motion = followed(activity->plan, base, since);
   for (;; activity->motion->go_on()) {
     if (!co_await follow(activity, base, since)) co_return std::nullopt;
@@ -52,70 +60,71 @@ Task<std::optional<TimePoint>> Axis::arrived(ActivityPtr activity, std::int64_t 
     if (shaft_.sample()->moving || shaft_.sample()->mode != DriveMode::positioning ||
         !shaft_.is_at(*activity->plan.target))
       continue;
-    if (watch_speed(SpeedWatch::Event::arrived)) co_return std::nullopt;
+    if (readings_.watch_speed(SpeedWatch::Event::arrived)) co_return std::nullopt;
     co_return when;
   }
 }
 
 /// A drive that was restarted, on the way or before, shows the counter 0: only where the reading at the
 /// target could be that, too, it has to prove that it is the same one.
-Task<bool> Axis::is_no_reboot(ActivityPtr activity) {
+Task<bool> MotionFollower::is_no_reboot(ActivityPtr activity) {
   if (shaft_.sample() && context_.drive->rules_out_restart(*shaft_.sample())) {
     // Else the canary would seem to be due, and a reading beside it would wait for the next start's place.
-    if (const auto proven = context_.drive->proven_at()) continuity_.proven(*proven);
+    if (const auto proven = context_.drive->proven_at()) reader_.continuity().proven(*proven);
     co_return true;
   }
-  keep_quiet(context_.env.clock->now() + std::min<Duration>(context_.settings.poll_moving, proof_patience));
+  reader_.keep_quiet(context_.env.clock->now() +
+                     std::min<Duration>(context_.settings.poll_moving, proof_patience));
   co_return co_await proven_continuous(activity);
 }
 
 /// Nothing was sent, as the axis rested at its target when it was read: what a terminal did since is looked
 /// for before it is called Done. False: the activity has ended.
-Task<bool> Axis::still_there(ActivityPtr activity) {
+Task<bool> MotionFollower::still_there(ActivityPtr activity) {
   if (!context_.may_move_by_itself()) co_return true;
   const auto since = context_.env.clock->now();
   while (!shaft_.sample() || shaft_.sample()->asked_at < since) {
-    wake();
+    reader_.wake();
     co_await shaft_.sampled().wait_until(context_.env.clock->now() + milliseconds(50));
-    if (!current(*activity)) co_return false;  // offline, too
+    if (!execution_.current(*activity)) co_return false;  // offline, too
   }
   if (!shaft_.found_in_motion() && shaft_.is_at(*activity->plan.target)) co_return true;
   auto cause = context_.error(Reason::moving, "the shaft was moved while the axis rested at its target",
                               "see what moves it; then repeat the move");
   cause.outcome = Outcome::not_executed;
   tell_part(*activity, cause);
-  finish(*activity, [&](CommandRecord& command) { command.error(std::move(cause)); });
+  execution_.finish(*activity, [&](CommandRecord& command) { command.error(std::move(cause)); });
   co_return false;
 }
 
 /// The drive was not restarted since its parameters were last written: the canary is read until it answers.
 /// False: the activity has ended.
-Task<bool> Axis::proven_continuous(ActivityPtr activity) {
+Task<bool> MotionFollower::proven_continuous(ActivityPtr activity) {
   Result<void> proof;
   do {
-    proof = co_await prove_continuity(TransactionClass::moving_state);
-    if (!current(*activity)) co_return false;  // offline, too
+    proof = co_await reader_.prove_continuity(TransactionClass::moving_state);
+    if (!execution_.current(*activity)) co_return false;  // offline, too
   } while (!proof && proof.error().reason == Reason::no_reply);
   if (proof) co_return true;
   if (proof.error().reason == Reason::rebooted) {
-    on_reboot(proof.error());
+    connection_.on_reboot(proof.error());
   } else {
     auto cause = proof.error();
     cause.outcome = Outcome::unknown;
-    fail_with_stop(*activity, std::move(cause));
+    execution_.fail_with_stop(*activity, std::move(cause));
   }
   co_return false;
 }
 
 /// What became of a trigger that was sent, and got no reply that says so. True: it was executed.
-Task<bool> Axis::read_back(ActivityPtr activity, Error cause, std::int64_t base, TimePoint since) {
+Task<bool> MotionFollower::read_back(ActivityPtr activity, Error cause, std::int64_t base, TimePoint since) {
   using State = StartReadback::State;
   StartReadback readback(since);
   while (readback.state() == State::reading) {
-    wake();
+    reader_.wake();
     co_await shaft_.sampled().wait_until(
         std::max(readback.deadline(), context_.env.clock->now() + milliseconds(50)));
-    if (!current(*activity)) {  // offline, too: then the command has ended as unknown
+    if (!execution_.current(*activity)) {  // offline, too: then the command has ended as unknown
       readback.superseded();
       break;
     }
@@ -141,7 +150,7 @@ Task<bool> Axis::read_back(ActivityPtr activity, Error cause, std::int64_t base,
   count(unknown_starts_, readback.state());
   if (readback.state() == State::executed) {
     activity->command->activate();
-    publish();
+    publisher_.publish();
     co_return true;
   }
   if (!proven) co_return false;
@@ -152,14 +161,14 @@ Task<bool> Axis::read_back(ActivityPtr activity, Error cause, std::int64_t base,
                     cause.reason == Reason::refused ? "was refused" : "got no reply", cause.message);
     tell_part(*activity, cause);
   }
-  fail_with_stop(*activity, std::move(cause));
+  execution_.fail_with_stop(*activity, std::move(cause));
   co_return false;
 }
 
 /// What the newest reading says of the activity's start from `base`. Precondition: there is an activity.
-std::optional<StartReadback::Reading> Axis::readback_of(std::int64_t base) const {
+std::optional<StartReadback::Reading> MotionFollower::readback_of(std::int64_t base) const {
   if (!shaft_.sample()) return std::nullopt;
-  const auto& target = activity_->plan.target;
+  const auto& target = execution_.activity()->plan.target;
   const bool certain =
       context_.drive->position_window() == 0 ||
       (target && has_come(shaft_.tracker().counter(), base, target->counter, context_.target_tolerance()));
@@ -170,36 +179,36 @@ std::optional<StartReadback::Reading> Axis::readback_of(std::int64_t base) const
 
 /// A position tells that the motion was executed. Where its drive takes it for arrived it may still be that
 /// window short of its target (M30).
-bool Axis::shows(const Plan& plan, std::int64_t base) const {
+bool MotionFollower::shows(const Plan& plan, std::int64_t base) const {
   const auto window = context_.drive->position_window();
   return window == 0 || std::abs(plan.target->counter - base) > 2 * window;
 }
 
 /// At rest, and not at the target.
-bool Axis::held_back(const Plan& plan) const {
+bool MotionFollower::held_back(const Plan& plan) const {
   return shaft_.limit_active(plan.positive) || shaft_.input_active("stop") ||
          shaft_.input_active("quick_stop");
 }
 
 /// When a motion is read that was acknowledged at `since`: its end is to be told at once, and before it has
 /// something to tell the line is left to others.
-void Axis::expect_end(const Plan& plan, std::int64_t base, TimePoint since) {
-  pace_.came();
+void MotionFollower::expect_end(const Plan& plan, std::int64_t base, TimePoint since) {
+  reader_.pace().came();
   // Of a way that its position does not tell only a reading in motion does: else its end is waited for long.
   if (!plan.endless && !shows(plan, base))
-    return poll_fast(since, std::max(plan.predicted, start_window) + end_window);
+    return reader_.poll_fast(since, std::max(plan.predicted, start_window) + end_window);
   if (!plan.endless) {
     const auto soonest = context_.planner.soonest(plan, plan.target->counter - base);
     const auto lead = std::min(soonest / end_lead_share, longest_end_lead);
-    poll_for_end(since + soonest - lead, plan.predicted - soonest + lead + end_window);
+    reader_.poll_for_end(since + soonest - lead, plan.predicted - soonest + lead + end_window);
   }
-  keep_quiet(std::min(pace_.next(since, true), since + longest_quiet));
+  reader_.keep_quiet(std::min(reader_.pace().next(since, true), since + longest_quiet));
   // What the poll loop asked for before the start would come too early, and keep the next one waiting.
   context_.env.bus->give_up_readings(context_.settings.node);
 }
 
 /// A motion by that plan, which was acknowledged at `since`.
-MotionMachine Axis::followed(const Plan& plan, std::int64_t base, TimePoint since) const {
+MotionMachine MotionFollower::followed(const Plan& plan, std::int64_t base, TimePoint since) const {
   return MotionMachine({.since = since,
                         .predicted = plan.predicted,
                         .endless = plan.endless,
@@ -208,7 +217,7 @@ MotionMachine Axis::followed(const Plan& plan, std::int64_t base, TimePoint sinc
 }
 
 /// What the newest reading says of a motion by that plan, from `base`. Precondition: there is one.
-MotionMachine::Reading Axis::reading_of(const Plan& plan, std::int64_t base) const {
+MotionMachine::Reading MotionFollower::reading_of(const Plan& plan, std::int64_t base) const {
   const bool certain = context_.drive->position_window() == 0 || held_back(plan) ||
                        (plan.target && has_come(shaft_.tracker().counter(), base, plan.target->counter,
                                                 context_.target_tolerance()));
@@ -226,7 +235,7 @@ MotionMachine::Reading Axis::reading_of(const Plan& plan, std::int64_t base) con
 
 /// The drive executes another motion, such as the one that this one replaced: the shaft is behind `base`, or
 /// beyond the target, by more than it settles or is turned as it is taken hold of.
-bool Axis::is_astray(const Plan& plan, std::int64_t base) const {
+bool MotionFollower::is_astray(const Plan& plan, std::int64_t base) const {
   const auto margin =
       std::max(context_.settings.scale.pulses_per_revolution / 8, 8 * context_.drive->position_window());
   const auto way = plan.endless ? 0 : plan.target->counter - base;
@@ -237,7 +246,7 @@ bool Axis::is_astray(const Plan& plan, std::int64_t base) const {
 
 /// Watches a motion until it ends. True: it rests at the plan's target. False: the activity has ended
 /// otherwise. Precondition: the activity has a motion.
-Task<bool> Axis::follow(ActivityPtr activity, std::int64_t base, TimePoint since) {
+Task<bool> MotionFollower::follow(ActivityPtr activity, std::int64_t base, TimePoint since) {
   using State = MotionMachine::State;
   const auto& plan = activity->plan;
   auto& motion = *activity->motion;
@@ -245,7 +254,7 @@ Task<bool> Axis::follow(ActivityPtr activity, std::int64_t base, TimePoint since
   for (;;) {
     const auto deadline = std::min(activity->hold_until.value_or(motion.latest()), motion.latest());
     co_await shaft_.sampled().wait_until(std::max(deadline, context_.env.clock->now() + milliseconds(20)));
-    if (!current(*activity)) co_return false;
+    if (!execution_.current(*activity)) co_return false;
     if (activity->hold_until && context_.env.clock->now() >= *activity->hold_until) {
       end_hold(*activity);
       co_return false;
@@ -256,7 +265,7 @@ Task<bool> Axis::follow(ActivityPtr activity, std::int64_t base, TimePoint since
       reading.elsewhere = shaft_.moved_from(base);  // nothing settles so long
     const auto state = motion.look(reading);
     if (state <= State::settling) continue;
-    pace_.came();
+    reader_.pace().came();
     if (state == State::arrived) co_return true;
     end_motion(*activity, state);
     co_return false;
@@ -264,34 +273,34 @@ Task<bool> Axis::follow(ActivityPtr activity, std::int64_t base, TimePoint since
 }
 
 /// Nobody has renewed the hold of a jog, or of a held velocity.
-void Axis::end_hold(Activity& activity) {
-  note_motion_to_stop();
-  revoke_motion();
-  leave_running(activity);
-  begin_stop(StopKind::halt, nullptr);
+void MotionFollower::end_hold(Activity& activity) {
+  execution_.note_motion_to_stop();
+  execution_.revoke_motion();
+  execution_.leave_running(activity);
+  stopper_.begin_stop(StopKind::halt, nullptr);
   auto cause = context_.error(Reason::expired, "the hold was not renewed in time",
                               "repeat the call within its hold time");
-  finish(activity, [&](CommandRecord& command) { command.abort(std::move(cause)); });
+  execution_.finish(activity, [&](CommandRecord& command) { command.abort(std::move(cause)); });
 }
 
 /// It has not arrived.
-void Axis::end_motion(Activity& activity, MotionMachine::State state) {
+void MotionFollower::end_motion(Activity& activity, MotionMachine::State state) {
   switch (state) {
     case MotionMachine::State::taken_over:
-      return fail_with_stop(activity,
-                            context_.error(Reason::terminal, "a terminal of the drive took over the motion",
-                                           "check the terminals"));
+      return execution_.fail_with_stop(
+          activity, context_.error(Reason::terminal, "a terminal of the drive took over the motion",
+                                   "check the terminals"));
     case MotionMachine::State::astray:
-      return fail_with_stop(
+      return execution_.fail_with_stop(
           activity,
           context_.error(Reason::not_reached, "the drive moves away from its target, and is being stopped",
                          "look at the machine; check load, tuning, and other masters on the bus"));
     case MotionMachine::State::did_not_start:
-      return fail_with_stop(
+      return execution_.fail_with_stop(
           activity, context_.error(Reason::did_not_start, "the drive accepted the start but does not move",
                                    "check limit and stop terminals, enable and alarm"));
     case MotionMachine::State::took_too_long:
-      return fail_with_stop(
+      return execution_.fail_with_stop(
           activity, context_.error(Reason::took_too_long, "the motion takes longer than predicted; stopped",
                                    "check the load, and other masters on the bus"));
     default:
@@ -300,23 +309,24 @@ void Axis::end_motion(Activity& activity, MotionMachine::State state) {
 }
 
 /// The drive rests, but not at the target: says why, and ends the activity.
-void Axis::end_at_rest(Activity& activity) {
+void MotionFollower::end_at_rest(Activity& activity) {
   const auto positive = activity.plan.positive;
   if (shaft_.limit_active(positive)) {
-    if (!context_.drive->closed_loop()) lose_trust();  // the overtravel stop has no ramp (M20)
-    return abort_at_rest(activity, context_.error(Reason::limit_switch,
-                                                  fmt::format("the {} limit switch ended the motion",
-                                                              positive ? "positive" : "negative"),
-                                                  "move away from it; home the axis"));
+    if (!context_.drive->closed_loop()) readings_.lose_trust();  // the overtravel stop has no ramp (M20)
+    return execution_.abort_at_rest(
+        activity, context_.error(
+                      Reason::limit_switch,
+                      fmt::format("the {} limit switch ended the motion", positive ? "positive" : "negative"),
+                      "move away from it; home the axis"));
   }
   const bool terminal = shaft_.input_active("stop") || shaft_.input_active("quick_stop");
   // Without a ramp an open loop may have lost steps (M20). A short pulse at a terminal, or another master,
   // leaves nothing by which to tell the kind of stop.
-  if (!context_.drive->closed_loop() && !shaft_.input_active("stop")) lose_trust();
+  if (!context_.drive->closed_loop() && !shaft_.input_active("stop")) readings_.lose_trust();
   if (terminal)
-    return abort_at_rest(activity,
-                         context_.error(Reason::terminal, "a stop terminal of the drive ended the motion",
-                                        "check the terminals"));
+    return execution_.abort_at_rest(
+        activity, context_.error(Reason::terminal, "a stop terminal of the drive ended the motion",
+                                 "check the terminals"));
   const auto& target = activity.plan.target;
   const auto short_of = target ? std::abs(shaft_.tracker().counter() - target->counter) : std::int64_t{0};
   auto cause = context_.error(Reason::not_reached,
@@ -335,7 +345,7 @@ void Axis::end_at_rest(Activity& activity) {
             context_.settling() / milliseconds(1)) +
         cause.remedy;
   }
-  fail_with_stop(activity, std::move(cause));
+  execution_.fail_with_stop(activity, std::move(cause));
 }
 
 }  // namespace axisd

@@ -1,5 +1,7 @@
 // Commands over restarts of the daemon: what has to be known before something is sent, and what became of
 // what an earlier run may have sent.
+#include "devices/axis/earlier_commands.hpp"
+
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
@@ -7,8 +9,10 @@
 #include <memory>
 #include <utility>
 
-#include "devices/axis/axis.hpp"
 #include "devices/axis/axis_log.hpp"
+#include "devices/axis/execution.hpp"
+#include "devices/axis/publisher.hpp"
+#include "devices/axis/readings.hpp"
 #include "devices/axis/restart_mark.hpp"
 #include "devices/axis/settlement.hpp"
 
@@ -26,37 +30,37 @@ bool moves(CommandKind kind) {
 }  // namespace
 
 /// What the run before this one left: a drive that may run, and outcomes that nobody has looked at (M4).
-void Axis::take_over() {
-  earlier_.take_over(context_.env.book->take_unsettled(context_.settings.name),
-                     context_.env.clock->now() + settling_limit);
-  for (const auto& earlier : earlier_.commands()) {
+void EarlierCommands::take_over() {
+  run_.take_over(context_.env.book->take_unsettled(context_.settings.name),
+                 context_.env.clock->now() + settling_limit);
+  for (const auto& earlier : run_.commands()) {
     const auto& command = earlier.command->value();
     log_about_axis(spdlog::level::warn, LogKind::unknown_outcome, context_.settings,
                    fmt::format("{}: the daemon ended while {} {} was being executed; asking the drive",
                                context_.settings.name, to_string(command.kind), command.id),
                    command.id);
     if (moves(command.kind)) owe_stop_of_motion();
-    if (command.kind == CommandKind::home) earlier_.doubt();
+    if (command.kind == CommandKind::home) run_.doubt();
   }
   if (auto cause = context_.env.book->take_unknown_outcome(context_.settings.name)) {
     log_about_axis(spdlog::level::err, LogKind::unknown_outcome, context_.settings, to_string(*cause));
-    fault_ = std::move(cause);
+    execution_.set_fault(*std::move(cause));
     owe_stop_of_motion();
   }
-  publish();
+  publisher_.publish();
 }
 
 /// What runs was begun by a command that has ended.
-void Axis::owe_stop_of_motion() {
+void EarlierCommands::owe_stop_of_motion() {
   stop_.owe();
   stop_.leave_running();
 }
 
 /// Asks a drive that rests what became of what may have been sent to it, before anything in it is changed.
-Task<Result<void>> Axis::settle_earlier() {
-  if (!earlier_.open()) co_return Result<void>{};
+Task<Result<void>> EarlierCommands::settle_earlier() {
+  if (!run_.open()) co_return Result<void>{};
   bool continuous = false;
-  if (const auto& marks = earlier_.commands().back().note.marks; !marks.empty()) {
+  if (const auto& marks = run_.commands().back().note.marks; !marks.empty()) {
     context_.drive->expect_marks(marks);
     const auto proof = co_await context_.drive->check_continuity(TransactionClass::parameters);
     if (!proof && proof.error().reason != Reason::rebooted) co_return proof;
@@ -69,18 +73,18 @@ Task<Result<void>> Axis::settle_earlier() {
   co_await sleep_until(context_.env.executor, *context_.env.clock, context_.env.clock->now() + start_window);
   const auto sample = co_await context_.drive->read_state(TransactionClass::idle_state);
   if (!sample) co_return fail(sample.error());
-  on_sample(*sample);
+  readings_.on_sample(*sample);
   if (life_.ends()) co_return fail(context_.error(Reason::cancelled, "the daemon ends"));
   if (shaft_.found_in_motion()) {
     owe_stop_of_motion();
     co_return fail(context_.error(Reason::moving, "it began to move; stopping it", "wait"));
   }
-  for (const auto& earlier : earlier_.commands()) settle_as(earlier, continuous);
-  earlier_.drop_ended();
+  for (const auto& earlier : run_.commands()) settle_as(earlier, continuous);
+  run_.drop_ended();
   co_return Result<void>{};
 }
 
-Error Axis::earlier_error(const Unsettled& earlier, std::string_view what, Outcome outcome) const {
+Error EarlierCommands::earlier_error(const Unsettled& earlier, std::string_view what, Outcome outcome) const {
   const auto& command = earlier.command->value();
   auto cause = context_.error(
       Reason::cancelled,
@@ -90,14 +94,14 @@ Error Axis::earlier_error(const Unsettled& earlier, std::string_view what, Outco
   return cause;
 }
 
-void Axis::settle_as_unknown(const Unsettled& earlier, std::string_view why) {
+void EarlierCommands::settle_as_unknown(const Unsettled& earlier, std::string_view why) {
   auto cause = earlier_error(earlier, why, Outcome::unknown);
   cause.remedy = "look at the machine; then reset the axis";
-  if (!fault_) fault_ = cause;
+  execution_.note_fault(cause);
   earlier.command->unknown(std::move(cause));
 }
 
-void Axis::settle_as(const Unsettled& earlier, bool continuous) {
+void EarlierCommands::settle_as(const Unsettled& earlier, bool continuous) {
   auto& command = *earlier.command;
   const auto kind = command.value().kind;
   if (kind == CommandKind::set_position) return;  // once it is known what the counter means
@@ -130,8 +134,8 @@ void Axis::settle_as(const Unsettled& earlier, bool continuous) {
 }
 
 /// Setting a position sends nothing: it was done if it is what the restart found saved.
-void Axis::settle_positions_set() {
-  for (const auto& earlier : earlier_.take_all()) {
+void EarlierCommands::settle_positions_set() {
+  for (const auto& earlier : run_.take_all()) {
     const auto position = earlier.command->value().asked.position.value_or(0);
     const bool kept = shaft_.tracker().trust() == PositionTrust::restored;
     if (kept && earlier.tellable && shaft_.tracker().offset_for(position) == shaft_.tracker().offset())
@@ -143,71 +147,12 @@ void Axis::settle_positions_set() {
   }
 }
 
-void Axis::give_up_settling() {
-  for (const auto& earlier : earlier_.take_all())
-    settle_as_unknown(earlier, "the drive could not be read since");
+void EarlierCommands::give_up_if_overdue() {
+  if (run_.overdue(context_.env.clock->now())) give_up_settling();
 }
 
-/// By what a restart tells whether the activity's start was executed.
-SendingNote Axis::note_of(const Activity& activity, std::vector<ContinuityMark> marks) const {
-  const auto raw = static_cast<std::int32_t>(shaft_.tracker().counter());
-  SendingNote note{
-      .start_pulses = raw, .tolerance_pulses = context_.target_tolerance(), .marks = std::move(marks)};
-  if (activity.command->value().kind == CommandKind::home) {
-    // Which way a compensation counts is the drive's business: one of both is enough to be careful.
-    const auto offset =
-        context_.scale.to_pulses(context_.settings.homing ? context_.settings.homing->offset : 0);
-    note.target_pulses = static_cast<std::int32_t>((raw < 0) == (offset < 0) ? offset : -offset);
-    if (const auto mark = context_.drive->continuity_mark(); mark && note.marks.empty()) note.marks = {*mark};
-    return note;
-  }
-  if (activity.plan.target) note.target_pulses = static_cast<std::int32_t>(activity.plan.target->counter);
-  return note;
-}
-
-/// Makes the command known to a restart, before anything is sent for it that may move. False: the activity
-/// has ended, and nothing was sent.
-Task<bool> Axis::noted(ActivityPtr activity, SendingNote note) {
-  if (!activity->start.note()) co_return true;
-  // Shared: the answer may come after this sequence was left.
-  auto answer = std::make_shared<Promise<Result<void>>>(context_.env.executor, *context_.env.clock);
-  context_.env.book->sending(activity->command, std::move(note),
-                             [answer](Result<void> result) { answer->set(std::move(result)); });
-  const auto durable = co_await answer->get();
-  if (!current(*activity)) co_return false;
-  activity->start.noted();
-  if (durable) co_return true;
-  auto cause = context_.error(durable.error().reason, "nothing was sent: " + durable.error().message,
-                              durable.error().remedy);
-  cause.where.native_code = durable.error().where.native_code;
-  finish(*activity, [&](CommandRecord& command) { command.error(std::move(cause)); });
-  co_return false;
-}
-
-Result<void> Axis::check_journal() const {
-  const auto trouble = context_.env.book->trouble();
-  if (!trouble) return {};
-  auto cause =
-      context_.error(Reason::storage, "nothing new is started: " + trouble->message, trouble->remedy);
-  cause.where.native_code = trouble->where.native_code;
-  return fail(std::move(cause));
-}
-
-/// Returns once a restart finds no position for the axis.
-Task<Result<void>> Axis::forget_saved_position() {
-  if (context_.env.persistence == nullptr) co_return Result<void>{};
-  auto answer = std::make_shared<Promise<Result<void>>>(context_.env.executor, *context_.env.clock);
-  context_.env.persistence->forget_offset(context_.settings.name,
-                                          [answer](Result<void> result) { answer->set(std::move(result)); });
-  co_return co_await answer->get();
-}
-
-/// What was saved for a command that then came to nothing: the record says again what the axis goes by.
-void Axis::correct_saved_position() {
-  if (shaft_.tracker().trust() != PositionTrust::unknown) return remember_position();
-  if (context_.env.persistence != nullptr)
-    forget_position(*context_.env.persistence, context_.settings.name,
-                    power_.state() == PowerMachine::State::restarted);
+void EarlierCommands::give_up_settling() {
+  for (const auto& earlier : run_.take_all()) settle_as_unknown(earlier, "the drive could not be read since");
 }
 
 }  // namespace axisd

@@ -1,0 +1,35 @@
+// What is kept of an axis's position over restarts of the daemon (M20).
+#pragma once
+
+#include <cstdint>
+
+#include "buses/task.hpp"
+#include "devices/axis/axis_context.hpp"
+#include "devices/axis/power_machine.hpp"
+#include "devices/axis/shaft.hpp"
+#include "devices/persistence.hpp"
+
+namespace axisd {
+
+/// Writes the record of the position; it is read when the drive is connected. Thread: core.
+class SavedPosition {
+ public:
+  SavedPosition(const AxisContext& context, const Shaft& shaft, const PowerMachine& power)
+      : context_(context), shaft_(shaft), power_(power) {}
+  SavedPosition(const SavedPosition&) = delete;
+
+  [[nodiscard]] OffsetRecord offset_record(std::int64_t offset, PositionTrust trust) const;
+  void remember_position();
+  void correct_saved_position();
+  /// A restart finds no position, and that the drive was restarted, if it was.
+  void void_saved_position();
+  Task<Result<void>> forget_saved_position();
+  Task<Result<void>> journal_offset(std::int64_t offset, PositionTrust trust);
+
+ private:
+  const AxisContext& context_;
+  const Shaft& shaft_;
+  const PowerMachine& power_;
+};
+
+}  // namespace axisd
