@@ -150,44 +150,20 @@ bool DriveConnection::found_by_terminal() const {
 
 /// M4: a drive found moving without a live command is stopped, unless a terminal started it.
 Task<Result<void>> DriveConnection::settle_found_motion() {
-  std::string_view found =
-      stopper_.machine().owed() ? "the stop that was owed to it was sent, and it came to rest" : "";
-  const bool may_move = shaft_.found_in_motion() ||
-                        (stopper_.machine().unseen_start().may_begin() && stopper_.machine().left_running());
+  auto& stop = stopper_.machine();
+  std::string_view found = stop.owed() ? "the stop that was owed to it was sent, and it came to rest" : "";
+  const bool may_move = shaft_.found_in_motion() || (stop.unseen_start().may_begin() && stop.left_running());
   if (may_move && !found_by_terminal()) {
-    if (!stopper_.machine().owed() &&
-        shaft_.sample()->moving) {  // else it may rest between the phases of homing, or for good
+    // Else it may rest between the phases of homing, or for good.
+    if (!stop.owed() && shaft_.sample()->moving) {
       log_about_axis(spdlog::level::warn, LogKind::moving_without_command, context_.settings,
                      fmt::format("{}: found moving; stopping it", context_.settings.name));
       found = "it was found moving, was stopped, and came to rest";
     }
-    stopper_.machine().owe();
-    bool rests = false, began = false;
-    for (auto kind = StopKind::stop;; kind = began ? kind : StopKind::quick_stop) {
-      const auto begun = stopper_.machine().unseen_start().begun();
-      const auto sent = co_await context_.drive->stop(kind);
-      const bool may_have_come = sent || sent.error().outcome == Outcome::unknown;
-      if (kind == StopKind::quick_stop && may_have_come && !context_.drive->closed_loop())
-        readings_.lose_trust();
-      if (!sent) co_return sent;
-      const auto braking = std::max(stopper_.machine().deceleration(), stopper_.braking_time(kind));
-      const auto deadline = context_.env.clock->now() + braking + context_.settings.stop_margin;
-      rests = co_await stopper_.standstill_unpolled(deadline, false);
-      began = stopper_.machine().unseen_start().begun() !=
-              begun;  // once for each start: that stop may have been ignored
-      if (!rests && !began && shaft_.sample()->asked_at < deadline)  // silent: it begins anew, with a stop
-        co_return fail(context_.error(Reason::no_reply, "the drive fell silent while it was being stopped",
-                                      "check power and wiring"));
-      if (rests || sequences_.life().ends() || (kind == StopKind::quick_stop && !began)) break;
-    }
-    if (!rests) {
-      if (context_.settings.stop_escalation_release && !sequences_.life().ends())
-        co_await context_.drive->disable({});
-      co_return fail(context_.error(Reason::not_confirmed, "found moving, and it does not stop",
-                                    "look at the machine; cut its power if it moves"));
-    }
+    stop.owe();
+    if (const auto stopped = co_await stop_found_motion(); !stopped) co_return stopped;
   }
-  stopper_.machine().pay();
+  stop.pay();
   if (!found.empty()) {
     spdlog::info("{}: {}", context_.settings.name, found);
     if (context_.env.event)
@@ -195,6 +171,34 @@ Task<Result<void>> DriveConnection::settle_found_motion() {
                          LinkChange{.to = link_.shown(), .detail = std::string(found)});
   }
   co_return Result<void>{};
+}
+
+/// With a quick stop where a stop does not bring it to rest.
+Task<Result<void>> DriveConnection::stop_found_motion() {
+  const auto& stop = stopper_.machine();
+  bool rests = false, began = false;
+  for (auto kind = StopKind::stop;; kind = began ? kind : StopKind::quick_stop) {
+    const auto begun = stop.unseen_start().begun();
+    const auto sent = co_await context_.drive->stop(kind);
+    const bool may_have_come = sent || sent.error().outcome == Outcome::unknown;
+    if (kind == StopKind::quick_stop && may_have_come && !context_.drive->closed_loop())
+      readings_.lose_trust();
+    if (!sent) co_return sent;
+    const auto braking = std::max(stop.deceleration(), stopper_.braking_time(kind));
+    const auto deadline = context_.env.clock->now() + braking + context_.settings.stop_margin;
+    rests = co_await stopper_.standstill_unpolled(deadline, false);
+    // Once for each start: that stop may have been ignored.
+    began = stop.unseen_start().begun() != begun;
+    if (!rests && !began && shaft_.sample()->asked_at < deadline)  // silent: it begins anew, with a stop
+      co_return fail(context_.error(Reason::no_reply, "the drive fell silent while it was being stopped",
+                                    "check power and wiring"));
+    if (rests || sequences_.life().ends() || (kind == StopKind::quick_stop && !began)) break;
+  }
+  if (rests) co_return Result<void>{};
+  if (context_.settings.stop_escalation_release && !sequences_.life().ends())
+    co_await context_.drive->disable({});
+  co_return fail(context_.error(Reason::not_confirmed, "found moving, and it does not stop",
+                                "look at the machine; cut its power if it moves"));
 }
 
 Task<Result<void>> DriveConnection::prove_or_configure() {

@@ -69,6 +69,7 @@ class DriveConnection {
   /// `again`: the attempt before was in vain.
   Task<Result<void>> try_connect(TransactionClass contact, bool again);
   Task<Result<void>> settle_found_motion();
+  Task<Result<void>> stop_found_motion();
   [[nodiscard]] bool may_have_been_stopped_abruptly() const;
   [[nodiscard]] std::vector<std::int64_t> unseen_ends() const;
   [[nodiscard]] bool found_by_terminal() const;

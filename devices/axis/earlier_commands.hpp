@@ -13,7 +13,6 @@
 
 namespace axisd {
 
-class AxisLife;
 class Execution;
 class Publisher;
 class Readings;

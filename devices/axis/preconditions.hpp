@@ -17,7 +17,6 @@
 
 namespace axisd {
 
-class AxisLife;
 class DriftCheck;
 class DriveWork;
 class Execution;

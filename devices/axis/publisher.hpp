@@ -15,7 +15,6 @@
 
 namespace axisd {
 
-class DriftWatch;
 class Execution;
 
 /// Makes the snapshots from what the other parts know, and tells what differs from the one before. Counts

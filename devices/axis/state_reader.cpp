@@ -135,14 +135,8 @@ Task<bool> StateReader::poll_once(Polling& polling) {
     }
   }
   if (result) {
-    const auto sample = co_await next_sample(polling);
-    polling.woken = sample && !*sample;
+    result = co_await read_next(polling);
     if (polling.woken) co_return link_.online();
-    if (!sample) result = fail(sample.error());
-    // Its node was held back: what was proven before that says nothing of it.
-    else if (continuity_.forgotten((*sample)->asked_at))
-      result = co_await prove_continuity(TransactionClass::moving_state);
-    if (result && !seen_again(**sample)) readings_.on_sample(**sample);
     if (!result && result.error().reason == Reason::rebooted) {
       if (link_.online()) connection_.on_reboot(result.error());
       co_return false;
@@ -153,18 +147,35 @@ Task<bool> StateReader::poll_once(Polling& polling) {
     polling.failures = 0;
     co_return true;
   }
+  co_return outlives(polling, result.error());
+}
+
+/// A reading, proven where that is due before it means anything. Woken in place of one: polling says so.
+Task<Result<void>> StateReader::read_next(Polling& polling) {
+  const auto sample = co_await next_sample(polling);
+  polling.woken = sample && !*sample;
+  if (polling.woken) co_return Result<void>{};
+  if (!sample) co_return fail(sample.error());
+  Result<void> result;
+  // Its node was held back: what was proven before that says nothing of it.
+  if (continuity_.forgotten((*sample)->asked_at))
+    result = co_await prove_continuity(TransactionClass::moving_state);
+  if (result && !seen_again(**sample)) readings_.on_sample(**sample);
+  co_return result;
+}
+
+/// A reading or a proof has failed. False: the link is gone with it.
+bool StateReader::outlives(Polling& polling, Error cause) {
   const bool unproven = continuity_.lost(context_.env.clock->now());
   // It was given up, as something has begun since, or cut by a stop: its node has not failed to answer.
-  polling.woken = result.error().reason == Reason::superseded;
-  if (polling.woken && !unproven) co_return true;
+  polling.woken = cause.reason == Reason::superseded;
+  if (polling.woken && !unproven) return true;
   if (!polling.woken) pace_.not_answered();
-  if (polling.woken) result = fail(not_heard());
-  if (result.error().reason == Reason::bus_down || ++polling.failures >= attempts_before_offline ||
-      unproven) {
-    connection_.go_offline(result.error());
-    co_return false;
-  }
-  co_return true;
+  if (polling.woken) cause = not_heard();
+  if (cause.reason != Reason::bus_down && ++polling.failures < attempts_before_offline && !unproven)
+    return true;
+  connection_.go_offline(cause);
+  return false;
 }
 
 Error StateReader::not_heard() const {

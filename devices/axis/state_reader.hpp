@@ -73,6 +73,8 @@ class StateReader {
   };
   [[nodiscard]] TimePoint next_poll(const Polling& polling, TimePoint began) const;
   Task<bool> poll_once(Polling& polling);
+  Task<Result<void>> read_next(Polling& polling);
+  bool outlives(Polling& polling, Error cause);
   [[nodiscard]] Error not_heard() const;
   Task<Result<std::optional<DriveSample>>> next_sample(Polling& polling);
   bool seen_again(const DriveSample& sample);
