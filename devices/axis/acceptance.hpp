@@ -41,6 +41,7 @@ class Acceptance {
 
   /// Accepts or refuses a request. What becomes of an accepted one is in its command.
   Result<CommandPtr> submit(const Action& action, const CommandOptions& options);
+  /// Halts the axis if `command` is being executed.
   Result<CommandPtr> cancel(const CommandPtr& command, TimePoint arrived);
   /// A stop that was accepted for the axis before this one, and not executed.
   void take_stop(const StopRequest& request, const CommandOptions& options, CommandPtr command);
@@ -49,6 +50,7 @@ class Acceptance {
   /// Enters a command and makes it the one that is executed; whatever was executed before is aborted and
   /// halted.
   ActivityPtr begin(const Action& action, const CommandOptions& options, AxisState state, Plan plan);
+  /// What its part of a group move would be; nothing is begun yet.
   Result<Plan> plan_member(const GroupMemberRequest& request, const CommandOptions& options);
   /// What waits next becomes what is executed.
   void start_next();

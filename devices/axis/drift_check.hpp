@@ -41,9 +41,13 @@ class DriftCheck {
         publisher_(publisher) {}
   DriftCheck(const DriftCheck&) = delete;
 
+  /// It is time for a comparison.
   [[nodiscard]] bool drift_is_next() const;
+  /// At rest: compares, or applies the configuration again to a drive that lost it.
   void look_for_drift();
+  /// Compares now. Errors: of Drive::check_drift().
   Task<Result<void>> check_for_drift(TransactionOptions options);
+  /// What is being compared counts no more.
   void give_up_comparison();
   /// The configuration was applied.
   void applied();

@@ -51,7 +51,9 @@ class DriveConnection {
 
   /// Connects and polls until the axis ends.
   Task<> run();
+  /// The drive does not answer any more: what was executed ends as Unknown, and a stop is owed (M4).
   void go_offline(const Error& cause);
+  /// The drive was restarted: what was executed ends, and it is configured anew (M7).
   void on_reboot(const Error& cause);
   /// The bus could not send for a while, however short, or a stop was not acknowledged: what the axis was
   /// doing ends, and a drive that may move gets a stop first (M4, M26).

@@ -34,7 +34,9 @@ class EarlierCommands {
 
   /// What the run before this one left: a drive that may run, and outcomes that nobody has looked at (M4).
   void take_over();
+  /// Judges by a drive that rests, before anything in it is changed. Errors: it moves, or does not answer.
   Task<Result<void>> settle_earlier();
+  /// Ends those that set a position: it was done if it is what was found saved.
   void settle_positions_set();
   /// Ends those of which the drive could not be asked in time.
   void give_up_if_overdue();

@@ -56,11 +56,15 @@ class Execution {
   void accept_now() { accept_epoch_ = context_.gate->epoch(); }
   [[nodiscard]] std::uint64_t accept_epoch() const { return accept_epoch_; }
 
+  /// It is what is executed, and nothing has forbidden its motion since it was accepted.
   [[nodiscard]] bool current(const Activity& activity) const;
+  /// Decides at each bind whether a frame of it may still go out.
   [[nodiscard]] MotionGuard guard(const Activity& activity) const;
   /// A held motion is being executed, and its hold is not over.
   [[nodiscard]] bool holds() const;
+  /// As PLCopen names it (plcopen_state.hpp).
   [[nodiscard]] AxisState state() const;
+  /// Something is executed, moves, or is to be stopped.
   [[nodiscard]] bool busy() const;
   /// Busy, and not only because its start bides its time.
   [[nodiscard]] bool works() const;
@@ -69,16 +73,25 @@ class Execution {
 
   /// Nothing of motion that was prepared so far is sent any more.
   void revoke_motion();
+  /// Ends what is executed as Aborted, and what waits behind it.
   void supersede(const Error& cause);
   /// Before the activity ends: the stop that follows shows what it ends.
   void note_motion_to_stop();
+  /// Its command ends, and its drive may go on: the stop that follows knows its ramp.
   void leave_running(const Activity& activity);
+  /// Nothing is executed any more; nullptr: nothing was.
   ActivityPtr take_activity();
+  /// Ends its command as `how` says, and starts what waits, or drops it. Nothing where it is not executed.
   void finish(Activity& activity, const std::function<void(CommandRecord&)>& how);
+  /// Ends it as Error, and stops the drive; in ErrorStop, unless it is known not to have been executed.
   void fail_with_stop(Activity& activity, Error cause);
+  /// Ends it as Aborted where a terminal has brought the drive to rest.
   void abort_at_rest(Activity& activity, Error cause);
+  /// ErrorStop: ends what is executed with the cause.
   void enter_error_stop(const Error& cause);
+  /// Ends all that waits.
   void drop_buffer(const Error& cause);
+  /// Ends one that waits, and those behind it. False: it does not wait.
   bool cancel_buffered(const CommandPtr& command);
 
  private:

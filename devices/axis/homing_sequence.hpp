@@ -36,6 +36,7 @@ class HomingSequence {
         saved_(saved) {}
   HomingSequence(const HomingSequence&) = delete;
 
+  /// Backs off from an active switch, homes, and declares the position at home.
   Task<> run_home(ActivityPtr activity);
 
  private:

@@ -36,7 +36,9 @@ class LeaseDuty {
   void lease_lost(const Error& cause);
   /// What is being executed, if it was given without a lease and needs one where there is one; else nullptr.
   [[nodiscard]] const Command* commanded_without_lease() const;
+  /// `on_lease_loss: disable` is done as soon as that can be.
   void release_as_owed();
+  /// The drive took part, and is not released: it is not tried again.
   void give_up_release(const Error& cause);
 
  private:

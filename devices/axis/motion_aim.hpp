@@ -27,8 +27,11 @@ class MotionAim {
         saved_(saved) {}
   MotionAim(const MotionAim&) = delete;
 
+  /// Plans its motion anew. Errors: as of Planner::move(); soft_limit.
   Result<void> aim(Activity& activity);
+  /// The drive would go as far as was asked, and that way. Errors: moving, soft_limit.
   [[nodiscard]] Result<void> check_way(const Activity& activity) const;
+  /// Zeroes the drive's counter before its target could leave that. Errors: as of Drive::clear_position().
   Task<Result<void>> make_room(ActivityPtr activity);
 
  private:

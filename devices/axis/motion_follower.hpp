@@ -35,11 +35,17 @@ class MotionFollower {
         publisher_(publisher) {}
   MotionFollower(const MotionFollower&) = delete;
 
+  /// What became of a trigger that was sent, and got no reply that says so. True: it was executed (M8).
   Task<bool> read_back(ActivityPtr activity, Error cause, std::int64_t base, TimePoint since);
+  /// A motion by that plan, which was acknowledged at `since`.
   [[nodiscard]] MotionMachine followed(const Plan& plan, std::int64_t base, TimePoint since) const;
+  /// Watches a motion until it ends. True: it rests at its target. False: it has ended otherwise.
   Task<bool> follow(ActivityPtr activity, std::int64_t base, TimePoint since);
+  /// The same, by the drive that began it: when it was read at its target (M10).
   Task<std::optional<TimePoint>> arrived(ActivityPtr activity, std::int64_t base, TimePoint since);
+  /// The reading at the target is not that of a drive that was restarted. False: it has ended.
   Task<bool> is_no_reboot(ActivityPtr activity);
+  /// Nothing was sent, as the axis rested at its target: it still does. False: it has ended.
   Task<bool> still_there(ActivityPtr activity);
 
   /// Since start.

@@ -44,13 +44,18 @@ class MotionSequence {
         publisher_(publisher) {}
   MotionSequence(const MotionSequence&) = delete;
 
+  /// A move to a target.
   Task<> run_move(ActivityPtr activity);
+  /// A velocity move or a jog: a move to its end, or speed mode.
   Task<> run_velocity(ActivityPtr activity);
   /// A member of a group, whose start was sent.
   Task<> run_member(ActivityPtr activity, std::int64_t base, TimePoint since, bool there,
                     std::shared_ptr<std::optional<TimePoint>> arrival);
+  /// Lets a halt in progress end (M9). False: it has ended.
   Task<bool> reach_standstill(ActivityPtr activity);
+  /// One positioning motion to the target of its plan. False: it has ended.
   Task<bool> positioned(ActivityPtr activity);
+  /// Judges what became of its start. True: it was executed.
   Task<bool> started(ActivityPtr activity, Result<void> result, std::int64_t base, TimePoint since);
 
   [[nodiscard]] MotionAim& aim() { return aim_; }

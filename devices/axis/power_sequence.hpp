@@ -40,10 +40,15 @@ class PowerSequence {
         publisher_(publisher) {}
   PowerSequence(const PowerSequence&) = delete;
 
+  /// Switches the power stage on; done once the brake is open.
   Task<> run_enable(ActivityPtr activity);
+  /// Stops, confirms standstill, then releases (M2).
   Task<> run_disable(ActivityPtr activity);
+  /// Clears the drive's alarm and the fault, if the drive can be read back.
   Task<> run_reset(ActivityPtr activity);
+  /// Declares the position, journalled before it is used (M20).
   Task<> run_set_position(ActivityPtr activity);
+  /// The shaft turned although nothing was started: ErrorStop and a stop (M1, M23).
   void on_turned_by_power(const Error& cause);
 
   [[nodiscard]] PowerMachine& machine() { return power_; }

@@ -26,6 +26,7 @@ class Publisher {
             const DriftWatch& drift, const Execution& execution);
   Publisher(const Publisher&) = delete;
 
+  /// Stores a new snapshot, and tells what differs from the one before.
   void publish();
   /// The snapshot is that of the reading which was just taken in.
   void note_sampled() { sampled_revision_ = revision_; }

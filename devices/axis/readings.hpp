@@ -39,7 +39,9 @@ class Readings {
         publisher_(publisher) {}
   Readings(const Readings&) = delete;
 
+  /// A new reading: takes it in, does what follows from it, and publishes.
   void on_sample(const DriveSample& sample);
+  /// The position is not to be believed any more (M20).
   void lose_trust();
   /// Ends what is under way as a fault where it is far faster than told. True: it has.
   bool watch_speed(SpeedWatch::Event event);

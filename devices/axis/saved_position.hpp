@@ -18,12 +18,17 @@ class SavedPosition {
       : context_(context), shaft_(shaft), power_(power) {}
   SavedPosition(const SavedPosition&) = delete;
 
+  /// What would be saved of the position with that offset.
   [[nodiscard]] OffsetRecord offset_record(std::int64_t offset, PositionTrust trust) const;
+  /// Saves it, where it is trusted.
   void remember_position();
+  /// The record says again what the axis goes by.
   void correct_saved_position();
   /// A restart finds no position, and that the drive was restarted, if it was.
   void void_saved_position();
+  /// Returns once a restart finds no position.
   Task<Result<void>> forget_saved_position();
+  /// Returns once a restart finds that one.
   Task<Result<void>> journal_offset(std::int64_t offset, PositionTrust trust);
 
  private:

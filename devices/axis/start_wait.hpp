@@ -21,13 +21,22 @@ class StartWait {
       : context_(context), shaft_(shaft), stop_(stop), execution_(execution) {}
   StartWait(const StartWait&) = delete;
 
+  /// From now on it has to start in time. `waited`: in the buffer, by its own wish; `halting`: for a motion
+  /// to end.
   void bound_start(const ActivityPtr& activity, bool waited, bool halting);
+  /// No start frame of it goes out after `latest`; the time counts from `since`.
   void start_by(const ActivityPtr& activity, TimePoint since, TimePoint latest);
+  /// Nothing was sent for it, as it would have been too late. `cause`: where that was found.
   [[nodiscard]] Error late(const Activity& activity, Error cause) const;
+  /// Ends it: nothing of it was sent, or it was refused.
   void end_unsent(Activity& activity, Error cause);
+  /// By what a restart tells whether its start was executed.
   [[nodiscard]] SendingNote note_of(const Activity& activity, std::vector<ContinuityMark> marks) const;
+  /// Makes it known to a restart, before anything is sent for it that may move. False: it has ended.
   Task<bool> noted(ActivityPtr activity, SendingNote note);
+  /// What was true at its acceptance holds still. False: it has ended.
   bool may_start(Activity& activity);
+  /// Waits for its turn to start on its line (M6). False: it has ended.
   Task<bool> take_turn(ActivityPtr activity);
   /// It is its turn to start now.
   void note_turn() { had_turn_ = context_.env.clock->now(); }

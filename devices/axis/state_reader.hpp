@@ -47,7 +47,9 @@ class StateReader {
   void wake();
   /// Notified by wake().
   [[nodiscard]] Signal& woken() { return wake_; }
+  /// Looks from now on whether the drive was unheard of for too long, until it is offline.
   void watch_continuity();
+  /// The drive was not restarted since its parameters were last written. Errors: rebooted, no_reply.
   Task<Result<void>> prove_continuity(TransactionClass priority);
   /// Reads the drive's state, unless the last reading is not older than `oldest`. Errors: as of
   /// Drive::read_state().
@@ -56,7 +58,9 @@ class StateReader {
   Task<Result<DriveSample>> sample_after(TimePoint since, Duration patience);
   /// Polls as fast as the bus can, while the axis is busy, from `from` on and for `longest` at most.
   void poll_fast(TimePoint from, Duration longest);
+  /// The same for the end of a motion, which may come a little later than `from`.
   void poll_for_end(TimePoint from, Duration longest);
+  /// What was just started is not read before, where readings of a line wait for each other.
   void keep_quiet(TimePoint until);
 
   [[nodiscard]] Continuity& continuity() { return continuity_; }

@@ -28,6 +28,7 @@ class Stopper {
           SavedPosition& saved, Publisher& publisher);
   Stopper(const Stopper&) = delete;
 
+  /// Sends a stop at once, and confirms it. `command` ends with it; nullptr: the axis decided on it itself.
   void begin_stop(StopKind kind, CommandPtr command);
   /// How long the drive brakes in such a stop, at most.
   [[nodiscard]] Duration braking_time(StopKind kind) const;
