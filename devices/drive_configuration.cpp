@@ -185,6 +185,48 @@ Task<Result<void>> DriveConfiguration::write(std::uint32_t address, std::vector<
   co_return written;
 }
 
+Task<Result<std::vector<ParameterValue>>> DriveConfiguration::write_parameters(
+    std::vector<ParameterValue> values) {
+  std::vector<std::uint32_t> addresses;
+  addresses.reserve(values.size());
+  for (const auto& value : values) addresses.push_back(value.address);
+  const auto before = co_await memory_->read_numbers(addresses);
+  if (!before) co_return fail(before.error());
+  const auto differs = [&](std::int64_t found, std::int64_t wanted) {
+    return ((found ^ wanted) & traits_.value_mask) != 0;
+  };
+  std::vector<ParameterValue> different;  // the others spare the EEPROM
+  for (std::size_t i = 0; i < values.size(); ++i)
+    if (differs((*before)[i].value, values[i].value)) different.push_back(values[i]);
+  const auto saves = static_cast<std::uint64_t>(
+      std::ranges::count_if(different, [&](const auto& value) { return is_saved(value.address); }));
+  if (saves > 0)  // all of them or none
+    if (const auto permitted = memory_->permit(saves); !permitted) co_return fail(permitted.error());
+  for (const auto& value : different)
+    if (const auto written = co_await write(value.address, {value.value & traits_.value_mask}); !written)
+      co_return fail(written.error());
+  auto present = co_await memory_->read_numbers(std::move(addresses));
+  if (!present) co_return present;
+  for (std::size_t i = 0; i < values.size(); ++i)
+    if (const auto found = (*present)[i].value; differs(found, values[i].value))
+      co_return fail(
+          memory_->error_at(Reason::misconfigured, values[i].address,
+                            fmt::format("reads {} after {} was written", found, values[i].value),
+                            "check whether another master writes to this drive, or its EEPROM fails"));
+  co_return present;
+}
+
+Task<Result<void>> DriveConfiguration::write_saved(std::vector<ParameterValue> values) {
+  // All of it or nothing: half of it might leave the drive out of reach. Two turn the switch, there and back.
+  if (const auto permitted = memory_->permit(values.size() + 2); !permitted) co_return permitted;
+  // A drive that was told not to save would have lost it when it counts.
+  if (const auto saving = co_await save_writes(true); !saving) co_return saving;
+  const auto written = co_await write_parameters(std::move(values));
+  const auto restored = co_await leave_switch();
+  if (!written) co_return fail(written.error());
+  co_return restored;
+}
+
 Task<Result<void>> DriveConfiguration::verify(std::vector<DriveSetting> required) {
   const auto after = co_await memory_->read(addresses_of(required), DriveMemory::Moment::after);
   if (!after) co_return fail(after.error());

@@ -39,6 +39,8 @@ class DriveMemory {
 
   /// All of these that the drive has.
   virtual Task<Result<SettingValues>> read(std::vector<std::uint32_t> addresses, Moment moment) = 0;
+  /// As a client sees them: numbers with their sign, in the order asked, all of them.
+  virtual Task<Result<std::vector<ParameterValue>>> read_numbers(std::vector<std::uint32_t> addresses) = 0;
   /// One request for values side by side, MemoryTraits::longest_run of them at most.
   virtual Task<Result<void>> write(std::uint32_t address, std::vector<std::int64_t> values) = 0;
   /// Turns MemoryTraits::saving_switch.
@@ -68,6 +70,7 @@ struct MemoryTraits {
   std::span<const TerminalFunctionSpec> input_functions{};
   std::span<const ParameterSpec> parameters{};  ///< those of rw_saved are saved as they are written
   bool saves_at_rest = false;                   ///< how the switch is left behind
+  std::int64_t value_mask = -1;                 ///< bits of a value, where the sign of a number is not sent
   std::size_t longest_run = 1;                  ///< values side by side that one request writes
   int write_attempts = 1;                       ///< as long as no reply comes; each is permitted and counted
 };
@@ -85,6 +88,11 @@ class DriveConfiguration {
   Task<Result<void>> bring_to(std::vector<DriveSetting> required);
   /// Writes values side by side, and counts what is saved of them.
   Task<Result<void>> write(std::uint32_t address, std::vector<std::int64_t> values);
+  /// Writes those that differ, none if not all may be saved, and reads all back. Errors: misconfigured
+  /// (differs), refused, no_reply, eeprom_budget.
+  Task<Result<std::vector<ParameterValue>>> write_parameters(std::vector<ParameterValue> values);
+  /// The same for what counts from the next power-up: they are saved, whatever `persist` says.
+  Task<Result<void>> write_saved(std::vector<ParameterValue> values);
   /// Turns the switch of saving, if it is not so already. `then`: saves that it is turned on for; they are
   /// permitted together, as turned in vain it only wears.
   Task<Result<void>> save_writes(bool saved, std::uint64_t then = 0);

@@ -22,6 +22,7 @@ class Cia402Drive::Memory final : public DriveMemory {
   Task<Result<SettingValues>> read(std::vector<std::uint32_t> addresses, Moment /*moment*/) override {
     return drive_->read_values(std::move(addresses), patiently());
   }
+  Task<Result<std::vector<ParameterValue>>> read_numbers(std::vector<std::uint32_t> addresses) override;
   Task<Result<void>> write(std::uint32_t address, std::vector<std::int64_t> values) override {
     return drive_->write_object(Object::of(address), values.front(), 0, patiently());
   }
@@ -42,6 +43,18 @@ class Cia402Drive::Memory final : public DriveMemory {
  private:
   Cia402Drive* drive_;
 };
+
+Task<Result<std::vector<ParameterValue>>> Cia402Drive::Memory::read_numbers(
+    std::vector<std::uint32_t> addresses) {
+  std::vector<ParameterValue> values;
+  for (const auto address : addresses) {
+    const auto value = co_await drive_->read_object(Object::of(address),
+                                                    {.transaction_class = TransactionClass::parameters});
+    if (!value) co_return fail(value.error());
+    values.push_back({.address = address, .value = *value});
+  }
+  co_return values;
+}
 
 Task<Result<DriveMemory::Activity>> Cia402Drive::Memory::activity() {
   const auto& model = *drive_->model_;

@@ -80,31 +80,7 @@ Task<Result<std::vector<ParameterValue>>> Cia402Drive::read_parameters(std::vect
 }
 
 Task<Result<std::vector<ParameterValue>>> Cia402Drive::write_parameters(std::vector<ParameterValue> values) {
-  std::vector<ParameterValue> different;  // the others spare the EEPROM
-  for (const auto& value : values) {
-    const auto before = co_await read_object(Object::of(value.address), parameters());
-    if (!before) co_return fail(before.error());
-    if (*before != value.value) different.push_back(value);
-  }
-  const auto saves = static_cast<std::uint64_t>(std::ranges::count_if(
-      different, [&](const auto& value) { return configuration_.is_saved(value.address); }));
-  if (saves > 0)  // all of them or none
-    if (const auto permitted = permit_saves(saves); !permitted) co_return fail(permitted.error());
-  for (const auto& value : different) {
-    const auto written = co_await configuration_.write(value.address, {value.value});
-    if (!written) co_return fail(written.error());
-  }
-  std::vector<ParameterValue> present;
-  for (const auto& value : values) {
-    const auto after = co_await read_object(Object::of(value.address), parameters());
-    if (!after) co_return fail(after.error());
-    if (*after != value.value)
-      co_return fail(error_at(Reason::misconfigured, Object::of(value.address),
-                              fmt::format("reads {} after {} was written", *after, value.value),
-                              "check whether another master writes to this drive, or its EEPROM fails"));
-    present.push_back({.address = value.address, .value = *after});
-  }
-  co_return present;
+  return configuration_.write_parameters(std::move(values));
 }
 
 Error Cia402Drive::not_supported(std::string message, std::string remedy) const {
@@ -249,14 +225,8 @@ Result<std::vector<ParameterValue>> Cia402Drive::addressing_objects(const Serial
 Task<Result<std::string>> Cia402Drive::change_serial(SerialChange change) {
   auto values = addressing_objects(change);
   if (!values) co_return fail(values.error());
-  // All of it or nothing: half of it might leave the drive out of reach. Two turn the switch, there and back.
-  if (const auto permitted = permit_saves(values->size() + 2); !permitted) co_return fail(permitted.error());
-  // Without `persist` the drive was told not to save: such a change would be gone when it counts.
-  if (const auto saving = co_await configuration_.save_writes(true); !saving) co_return fail(saving.error());
-  const auto written = co_await write_parameters(std::move(*values));
-  const auto restored = co_await configuration_.leave_switch();
-  if (!written) co_return fail(written.error());
-  if (!restored) co_return fail(restored.error());
+  const auto saved = co_await configuration_.write_saved(std::move(*values));
+  if (!saved) co_return fail(saved.error());
   std::string text = "it counts from the next power-up";
   const auto& addressing = *model_->addressing;
   if (change.node && !addressing.node_switches.empty())

@@ -31,6 +31,9 @@ class YakoRtuDrive::Memory final : public DriveMemory {
   explicit Memory(YakoRtuDrive& drive) : drive_(&drive) {}
 
   Task<Result<SettingValues>> read(std::vector<std::uint32_t> addresses, Moment moment) override;
+  Task<Result<std::vector<ParameterValue>>> read_numbers(std::vector<std::uint32_t> addresses) override {
+    return drive_->read_values(std::move(addresses), parameters());
+  }
   Task<Result<void>> write(std::uint32_t address, std::vector<std::int64_t> values) override;
   Task<Result<void>> turn_switch(bool saves) override;
   Task<Result<Activity>> activity() override;
@@ -106,6 +109,7 @@ MemoryTraits YakoRtuDrive::memory_traits() const {
           .input_functions = model_->descriptor->input_functions,
           .parameters = model_->descriptor->parameters,
           .saves_at_rest = setup_.persist == PersistSettings::all(),
+          .value_mask = 0xFFFF,
           .longest_run = longest_write,
           .write_attempts = write_attempts};
 }

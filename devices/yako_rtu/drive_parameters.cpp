@@ -77,32 +77,8 @@ Task<Result<std::vector<ParameterValue>>> YakoRtuDrive::read_values(std::vector<
 }
 
 Task<Result<std::vector<ParameterValue>>> YakoRtuDrive::write_parameters(std::vector<ParameterValue> values) {
-  std::vector<std::uint32_t> addresses;
-  addresses.reserve(values.size());
-  for (const auto& value : values) addresses.push_back(value.address);
-  const auto before = co_await read_values(addresses, parameters());
-  if (!before) co_return fail(before.error());
-  const auto differs = [&](std::size_t i) {
-    return ((*before)[i].value & 0xFFFF) != (values[i].value & 0xFFFF);
-  };
-  std::uint64_t saves = 0;  // all of them or none
-  for (std::size_t i = 0; i < values.size(); ++i)
-    if (differs(i) && configuration_.is_saved(values[i].address)) ++saves;
-  if (saves > 0)
-    if (const auto permitted = permit_saves(saves); !permitted) co_return fail(permitted.error());
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    if (!differs(i)) continue;  // spares the EEPROM
-    const auto written = co_await configuration_.write(values[i].address, {values[i].value & 0xFFFF});
-    if (!written) co_return fail(written.error());
-  }
-  auto present = co_await read_values(std::move(addresses), parameters());
+  auto present = co_await configuration_.write_parameters(std::move(values));
   if (!present) co_return present;
-  for (std::size_t i = 0; i < values.size(); ++i)
-    if (((*present)[i].value & 0xFFFF) != (values[i].value & 0xFFFF))
-      co_return fail(
-          error_at(Reason::misconfigured, static_cast<std::uint16_t>(values[i].address),
-                   fmt::format("reads {} after {} was written", (*present)[i].value, values[i].value),
-                   "check whether another master writes to this drive, or its EEPROM fails"));
   for (const auto& value : *present)
     note_register(static_cast<std::uint16_t>(value.address),
                   static_cast<std::uint16_t>(value.value & 0xFFFF));
@@ -249,14 +225,8 @@ std::string YakoRtuDrive::serial_advice(const SerialChange& change) const {
 Task<Result<std::string>> YakoRtuDrive::change_serial(SerialChange change) {
   auto values = serial_registers(change);
   if (!values) co_return fail(values.error());
-  // All of it or nothing: half of it might leave the drive out of reach. Two turn the switch, there and back.
-  if (const auto permitted = permit_saves(values->size() + 2); !permitted) co_return fail(permitted.error());
-  // Without `persist` the drive was told not to save: such a change would be gone when it counts.
-  if (const auto saving = co_await configuration_.save_writes(true); !saving) co_return fail(saving.error());
-  const auto written = co_await write_parameters(std::move(*values));
-  const auto restored = co_await configuration_.leave_switch();
-  if (!written) co_return fail(written.error());
-  if (!restored) co_return fail(restored.error());
+  const auto saved = co_await configuration_.write_saved(std::move(*values));
+  if (!saved) co_return fail(saved.error());
   co_return serial_advice(change);
 }
 

@@ -43,6 +43,17 @@ class FakeMemory final : public DriveMemory {
     if (const auto& error = before ? read_fails_before : read_fails_after) co_return fail(*error);
     co_return found;
   }
+  Task<Result<std::vector<ParameterValue>>> read_numbers(std::vector<std::uint32_t> addresses) override {
+    std::string line = "numbers";
+    std::vector<ParameterValue> found;
+    for (const auto address : addresses) {
+      line += fmt::format(" {:x}", address);
+      found.push_back({.address = address, .value = values.at(address)});
+    }
+    note(line);
+    if (const auto& error = read_fails_before) co_return fail(*error);
+    co_return found;
+  }
   Task<Result<void>> write(std::uint32_t address, std::vector<std::int64_t> written) override {
     std::string line = fmt::format("{:x}=", address);
     for (std::size_t i = 0; i < written.size(); ++i)
