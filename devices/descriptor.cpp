@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "devices/axis/settings.hpp"
+
 namespace axisd {
 
 const DriveDescriptor* find_drive_model(std::string_view model) {

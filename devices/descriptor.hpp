@@ -22,6 +22,8 @@
 
 namespace axisd {
 
+struct AxisSettings;
+
 namespace modbus_rtu {
 class RtuBus;
 }

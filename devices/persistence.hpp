@@ -13,7 +13,7 @@
 #include "buses/error.hpp"
 #include "devices/axis/snapshot.hpp"
 #include "devices/axis/stop_holds.hpp"
-#include "devices/drive.hpp"
+#include "devices/drive_values.hpp"
 #include "devices/kept_state.hpp"
 
 namespace axisd {

@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-#include "devices/drive.hpp"
+#include "devices/drive_values.hpp"
 
 namespace axisd::store {
 

@@ -212,7 +212,7 @@ Task<Result<void>> DriveConnection::prove_or_configure() {
     // has died before it kept what it wrote last. A driver that knows no canary yet would never say so:
     // here only the counter is asked.
     const bool counts_on =
-        context_.drive->Drive::rules_out_restart(*shaft_.sample()) && !context_.may_move_by_itself();
+        context_.drive->counts_on(*shaft_.sample()) && !context_.may_move_by_itself();
     if (!proof && !counts_on) power_.restarted();
     if (restorable && (!proof || restorable->trust == PositionTrust::unknown)) {
       void_saved_position();

@@ -17,6 +17,30 @@ Error DriveOperations::error(Reason reason, std::string message, std::string rem
           .where = {.bus = settings.bus, .node = settings.node}};
 }
 
+/// The one place that says what a model lacks.
+template <class Facet>
+Result<Facet*> DriveOperations::needed(Facet* facet, std::string_view what, std::string remedy) const {
+  if (facet != nullptr) return facet;
+  const auto& settings = axis_->settings();
+  return fail(Error{.reason = Reason::not_supported,
+                    .message = fmt::format("{} has no {}", axis_->descriptor().model, what),
+                    .remedy = std::move(remedy),
+                    .where = {.bus = settings.bus, .node = settings.node}});
+}
+
+Result<ParametersFacet*> DriveOperations::parameters() const {
+  return needed(axis_->drive().facets().parameters, "parameters", "see the drive's manual");
+}
+
+Result<SegmentsFacet*> DriveOperations::segments_facet() const {
+  return needed(axis_->drive().facets().segments, "table of segments", "give each motion as a command");
+}
+
+Result<MemoryFacet*> DriveOperations::memory() const {
+  return needed(axis_->drive().facets().memory, "memory that can be saved or restored over the bus",
+                "see the drive's manual");
+}
+
 const ParameterSpec* DriveOperations::find(std::uint32_t address) const {
   return find_parameter(axis_->descriptor().parameters, address);
 }
@@ -26,8 +50,10 @@ DriveInfo DriveOperations::info() const {
                  .identity = axis_->identity(),
                  .eeprom_writes = axis_->eeprom_writes(),
                  .persist = axis_->settings().persist.any()};
+  const auto* facet = axis_->drive().facets().parameters;
+  if (facet == nullptr) return info;
   for (const auto& parameter : info.descriptor->parameters)
-    if (auto owner = axis_->drive().configured_by(parameter.address); !owner.empty())
+    if (auto owner = facet->configured_by(parameter.address); !owner.empty())
       info.configured_by.emplace(parameter.address, std::move(owner));
   return info;
 }
@@ -43,8 +69,10 @@ Task<Result<std::vector<ParameterValue>>> DriveOperations::read_parameters(
                             parameter == nullptr ? object_text(address) : std::string(parameter->name)),
                 "list them: axisctl drive parameters"));
   }
+  const auto facet = parameters();
+  if (!facet) co_return fail(facet.error());
   if (auto online = axis_->check_online(); !online) co_return fail(online.error());
-  co_return co_await axis_->drive().read_parameters(std::move(addresses));
+  co_return co_await (*facet)->read_parameters(std::move(addresses));
 }
 
 Result<void> DriveOperations::check_write(const ParameterValue& value) const {
@@ -71,7 +99,9 @@ Result<void> DriveOperations::check_write(const ParameterValue& value) const {
                                       .unit = std::string(parameter->unit)};
     return refusal;
   }
-  if (const auto owner = axis_->drive().configured_by(value.address); !owner.empty())
+  const auto facet = parameters();
+  if (!facet) return fail(facet.error());
+  if (const auto owner = (*facet)->configured_by(value.address); !owner.empty())
     return named(fmt::format("is decided by {}", owner), "change it there");
   return {};
 }
@@ -80,21 +110,25 @@ Task<Result<std::vector<ParameterValue>>> DriveOperations::write_parameters(
     std::vector<ParameterValue> values, std::vector<ParameterValue>* before) const {
   for (const auto& value : values)
     if (auto allowed = check_write(value); !allowed) co_return fail(allowed.error());
+  const auto facet = parameters();
+  if (!facet) co_return fail(facet.error());
   const auto maintenance = axis_->begin_maintenance();
   if (!maintenance) co_return fail(maintenance.error());
   if (before != nullptr) {
     std::vector<std::uint32_t> addresses;
     for (const auto& value : values) addresses.push_back(value.address);
-    auto read = co_await axis_->drive().read_parameters(std::move(addresses));
+    auto read = co_await (*facet)->read_parameters(std::move(addresses));
     if (!read) co_return fail(read.error());
     *before = *std::move(read);
   }
-  co_return co_await axis_->drive().write_parameters(std::move(values));
+  co_return co_await (*facet)->write_parameters(std::move(values));
 }
 
 Task<Result<SegmentSettings>> DriveOperations::read_segments() const {
   if (auto online = axis_->check_online(); !online) co_return fail(online.error());
-  const auto segments = co_await axis_->drive().read_segments();
+  const auto facet = segments_facet();
+  if (!facet) co_return fail(facet.error());
+  const auto segments = co_await (*facet)->read_segments();
   if (!segments) co_return fail(segments.error());
   co_return from_drive(*segments, axis_->settings(), axis_->scale());
 }
@@ -106,6 +140,8 @@ Task<Result<SegmentSettings>> DriveOperations::write_segments(SegmentSettings se
   if (axis_->settings().segments)
     co_return fail(error(Reason::invalid_argument, "the segments are decided by the configuration",
                          "change them there"));
+  const auto facet = segments_facet();
+  if (!facet) co_return fail(facet.error());
   const auto table = to_drive(segments, axis_->settings(), axis_->scale(), axis_->descriptor());
   if (!table) co_return fail(table.error());
   const auto maintenance = axis_->begin_maintenance();
@@ -115,15 +151,17 @@ Task<Result<SegmentSettings>> DriveOperations::write_segments(SegmentSettings se
                          "absolute segments count from home, but the position was declared elsewhere",
                          "home the axis first"));
   axis_->set_absolute_segments(segments.absolute);
-  const auto written = co_await axis_->drive().write_segments(*table);
+  const auto written = co_await (*facet)->write_segments(*table);
   if (!written) co_return fail(written.error());
   co_return co_await read_segments();
 }
 
 Task<Result<void>> DriveOperations::save_parameters() const {
+  const auto facet = memory();
+  if (!facet) co_return fail(facet.error());
   const auto maintenance = axis_->begin_maintenance();
   if (!maintenance) co_return fail(maintenance.error());
-  const auto saved = co_await axis_->drive().save_parameters();
+  const auto saved = co_await (*facet)->save_parameters();
   const bool unknown = !saved && saved.error().outcome == Outcome::unknown;
   if (unknown && !axis_->drive().continuity_mark())
     axis_->reconfigure("whether the drive was restarted as it saved is not known", true);
@@ -132,9 +170,11 @@ Task<Result<void>> DriveOperations::save_parameters() const {
 }
 
 Task<Result<std::string>> DriveOperations::restore_factory(std::vector<std::uint8_t> taken) const {
+  const auto facet = memory();
+  if (!facet) co_return fail(facet.error());
   auto maintenance = axis_->begin_maintenance();
   if (!maintenance) co_return fail(maintenance.error());
-  auto restored = co_await axis_->drive().restore_factory(std::move(taken));
+  auto restored = co_await (*facet)->restore_factory(std::move(taken));
   // Without a reply it may have been restored all the same.
   if (restored || restored.error().outcome == Outcome::unknown)
     axis_->reconfigure("the factory settings were restored", true);
@@ -147,9 +187,12 @@ Task<Result<std::string>> DriveOperations::change_serial(SerialChange change,
     co_return fail(error(Reason::invalid_argument,
                          fmt::format("address {} belongs to another node of this bus", *change.node),
                          "choose a free one: axisctl bus scan"));
+  const auto facet =
+      needed(axis_->drive().facets().serial, "address that is set over the bus", "use the drive's switches");
+  if (!facet) co_return fail(facet.error());
   const auto maintenance = axis_->begin_maintenance();
   if (!maintenance) co_return fail(maintenance.error());
-  co_return co_await axis_->drive().change_serial(change);
+  co_return co_await (*facet)->change_serial(change);
 }
 
 }  // namespace axisd

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "buses/task.hpp"
@@ -31,6 +32,12 @@ class DriveOperations {
 
  private:
   [[nodiscard]] Error error(Reason reason, std::string message, std::string remedy) const;
+  /// Error: not_supported, where the model lacks it.
+  template <class Facet>
+  Result<Facet*> needed(Facet* facet, std::string_view what, std::string remedy) const;
+  [[nodiscard]] Result<ParametersFacet*> parameters() const;
+  [[nodiscard]] Result<SegmentsFacet*> segments_facet() const;
+  [[nodiscard]] Result<MemoryFacet*> memory() const;
   [[nodiscard]] const ParameterSpec* find(std::uint32_t address) const;
   [[nodiscard]] Result<void> check_write(const ParameterValue& value) const;
 

@@ -12,7 +12,7 @@ namespace axisd {
 namespace {
 
 /// Longest that a shaft takes to follow the drive to where it has stopped.
-constexpr Duration home_settling = milliseconds(500);
+constexpr Duration home_settling = std::chrono::milliseconds(500);
 
 }  // namespace
 

@@ -6,10 +6,10 @@
 #include <memory>
 #include <optional>
 #include <string>
-#include <variant>
 #include <vector>
 
 #include "buses/clock.hpp"
+#include "devices/setup_values.hpp"
 #include "devices/units/scale.hpp"
 
 namespace axisd {
@@ -17,16 +17,6 @@ namespace axisd {
 using std::chrono::milliseconds;
 
 struct DriveDescriptor;
-
-/// Homing methods, in axis direction. Further ones may follow with further families.
-enum class HomingMethod : std::uint8_t { home_positive, home_negative, positive_limit, negative_limit };
-
-/// One terminal as the YAML assigns it: `X1: { function: positive_limit, active: low }`.
-struct TerminalSettings {
-  std::string terminal;  ///< "X0", "PU", "Y1"
-  std::string function;  ///< by the descriptor's name; axis direction
-  bool active_low = false;
-};
 
 /// One row of the drive's own table of positions (multi-position, PT; RTU manuals 7.3). User units.
 struct PositionSegment {
@@ -50,15 +40,6 @@ struct SegmentSettings {
   std::vector<PositionSegment> positions{};
   std::vector<VelocitySegment> velocities{};
   bool operator==(const SegmentSettings&) const = default;
-};
-
-/// What is saved in the drive's EEPROM: `persist: true`, `false`, or a list of these.
-struct PersistSettings {
-  bool terminals = false, segments = false, homing = false;
-  bool drive = false;  ///< microstep and everything under `drive:`
-  [[nodiscard]] bool any() const { return terminals || segments || homing || drive; }
-  static constexpr PersistSettings all() { return {true, true, true, true}; }
-  bool operator==(const PersistSettings&) const = default;
 };
 
 /// A brake that an output of the drive works (M2). The drive switches the output with its power stage.
@@ -98,9 +79,6 @@ enum class LeaseLoss : std::uint8_t {
   disable,  ///< stop, confirm standstill, release the power stage
   finish    ///< lets a move or homing that has started end; anything else halts
 };
-
-/// Value of a model-specific setting, after the descriptor's schema was applied.
-using SettingValue = std::variant<bool, std::int64_t, double, std::string>;
 
 /// How often the canary is read, whatever the polling period: at least every second (M7), less what the wire
 /// takes.

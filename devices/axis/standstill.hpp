@@ -28,7 +28,7 @@ class StandstillWatch {
  public:
   enum class State : std::uint8_t { moving, resting };
   /// So long it rests within homing before that is no pause between two phases.
-  static constexpr Duration rest = milliseconds(150);
+  static constexpr Duration rest = std::chrono::milliseconds(150);
 
   StandstillWatch(TimePoint since, TimePoint deadline) : since_(since), deadline_(deadline) {}
   /// `counter`: where the reading has the shaft. `window`: pulses within which that wavers.

@@ -44,7 +44,16 @@ namespace axisd::cia402 {
 /// Power never moves (M23). In Operation Enabled a drive of this family rests in one of two ways: ready
 /// (control word 0Fh, no motion under way), or halted (10Fh) after a stop. A halt is only ever released with
 /// nothing behind it: see make_ready().
-class Cia402Drive final : public Drive {
+class Cia402Drive final : public Drive,
+                          public ParametersFacet,
+                          public MemoryFacet,
+                          public SerialFacet,
+                          public LoadingFacet,
+                          public CommonStartFacet,
+                          public DriftFacet,
+                          public MarksFacet,
+                          public NewsFacet,
+                          public StopsFacet {
  public:
   Cia402Drive(const Model& model, DriveContext context);
   ~Cia402Drive() override;
@@ -53,7 +62,6 @@ class Cia402Drive final : public Drive {
   // drive_connection.cpp
   Task<Result<DriveIdentity>> identify(TransactionClass transaction_class) override;
   Task<Result<void>> configure() override;
-  [[nodiscard]] bool moves_by_itself() const override { return false; }
   [[nodiscard]] bool closed_loop() const override;
   [[nodiscard]] std::int64_t position_window() const override;
 
@@ -80,6 +88,7 @@ class Cia402Drive final : public Drive {
   // drive_stop.cpp
   Task<Result<void>> stop(StopKind kind) override;
   [[nodiscard]] std::optional<TimePoint> stop_sent_at() const override { return stops_.frame_at(); }
+  Task<Result<void>> repeat_stop() override { return stop(StopKind::stop); }
   [[nodiscard]] std::optional<Duration> quick_stop_time(int rpm) const override;
 
   // drive_motion.cpp
@@ -100,8 +109,6 @@ class Cia402Drive final : public Drive {
   [[nodiscard]] std::string configured_by(std::uint32_t address) const override;
   Task<Result<std::vector<ParameterValue>>> read_parameters(std::vector<std::uint32_t> addresses) override;
   Task<Result<std::vector<ParameterValue>>> write_parameters(std::vector<ParameterValue> values) override;
-  Task<Result<DriveSegments>> read_segments() override;
-  Task<Result<void>> write_segments(DriveSegments segments) override;
   Task<Result<void>> save_parameters() override;
   Task<Result<std::string>> restore_factory(std::vector<std::uint8_t> taken) override;
   Task<Result<std::string>> change_serial(SerialChange change) override;

@@ -60,7 +60,16 @@ std::string objection(const canopen::PdoOutcome& outcome, const canopen::PdoSett
 }  // namespace
 
 Cia402Drive::Cia402Drive(const Model& model, DriveContext context)
-    : model_(&model),
+    : Drive({.parameters = this,
+             .memory = this,
+             .serial = this,
+             .loading = this,
+             .common_start = this,
+             .drift = this,
+             .marks = this,
+             .news = this,
+             .stops = this}),
+      model_(&model),
       executor_(context.executor),
       clock_(context.clock),
       bus_(context.canopen),

@@ -90,16 +90,6 @@ Error Cia402Drive::not_supported(std::string message, std::string remedy) const 
           .where = {.bus = bus_->name(), .node = node_.id()}};
 }
 
-Task<Result<DriveSegments>> Cia402Drive::read_segments() {
-  co_return fail(not_supported(fmt::format("{} has no table of segments", model_->descriptor->model),
-                               "give each motion as a command"));
-}
-
-Task<Result<void>> Cia402Drive::write_segments(DriveSegments /*segments*/) {
-  const auto none = co_await read_segments();
-  co_return fail(none.error());
-}
-
 Task<Result<void>> Cia402Drive::quieten() {
   // A terminal that starts a motion (position, velocity) would run with what stands here.
   const auto velocity = co_await read_target_velocity(parameters());

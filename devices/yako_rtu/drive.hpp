@@ -26,7 +26,17 @@ namespace axisd::yako_rtu {
 /// The canary: registers 0x0020..0x0025 live in RAM. Whatever stands there after a power-up is never what
 /// this class last wrote, so one read of the block proves that the drive has not been restarted since (M6,
 /// M7).
-class YakoRtuDrive final : public Drive {
+class YakoRtuDrive final : public Drive,
+                           public ParametersFacet,
+                           public SegmentsFacet,
+                           public MemoryFacet,
+                           public SerialFacet,
+                           public LoadingFacet,
+                           public DriftFacet,
+                           public RepeatedWatchFacet,
+                           public MarksFacet,
+                           public ProofFacet,
+                           public StopsFacet {
  public:
   YakoRtuDrive(const Model& model, DriveContext context);
 
@@ -68,6 +78,7 @@ class YakoRtuDrive final : public Drive {
   Task<Result<std::unique_ptr<LoadedMove>>> load_move(MoveProfile profile, MotionGuard guard) override;
   Task<Result<void>> stop(StopKind kind) override;
   Task<Result<void>> repeat_stop() override;
+  [[nodiscard]] std::optional<Duration> quick_stop_time(int /*rpm*/) const override { return Duration{}; }
   [[nodiscard]] std::optional<TimePoint> stop_sent_at() const override {
     return node_.bus().stop_sent_at(node_.address());
   }

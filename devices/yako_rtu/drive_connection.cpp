@@ -24,7 +24,17 @@ double highest_rate(const Capabilities& capabilities, const DriveSetup& setup) {
 }  // namespace
 
 YakoRtuDrive::YakoRtuDrive(const Model& model, DriveContext context)
-    : model_(&model),
+    : Drive({.parameters = this,
+             .segments = this,
+             .memory = this,
+             .serial = this,
+             .loading = this,
+             .drift = this,
+             .repeated_watch = this,
+             .marks = this,
+             .proof = this,
+             .stops = this}),
+      model_(&model),
       clock_(context.clock),
       node_(*context.rtu, context.node),
       setup_(std::move(context.setup)),

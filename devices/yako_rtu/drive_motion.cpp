@@ -119,7 +119,7 @@ bool YakoRtuDrive::is_started_by_terminals() const {
 /// Where it rests just where the block in its memory sent it, too: a released shaft may have been turned off
 /// 0 by hand since a restart, but hardly to there. A terminal may well have sent it there again.
 bool YakoRtuDrive::rules_out_restart(const DriveSample& sample) const {
-  if (!canary_.is_known() || is_started_by_terminals() || !Drive::rules_out_restart(sample)) return false;
+  if (!canary_.is_known() || is_started_by_terminals() || !counts_on(sample)) return false;
   return std::abs(target_of(canary_.blocks().front()) - sample.position_pulses) <= position_window();
 }
 

@@ -48,7 +48,10 @@ DriveSample decode(std::span<const std::uint16_t> registers) {
 }  // namespace
 
 ServoDrive::ServoDrive(DriveContext context)
-    : clock_(context.clock), node_(*context.rtu, context.node), setup_(std::move(context.setup)) {
+    : Drive({.marks = this}),
+      clock_(context.clock),
+      node_(*context.rtu, context.node),
+      setup_(std::move(context.setup)) {
   const auto* descriptor = find_drive_model("acme-s1");
   const auto assigned = assign_terminals(setup_.inputs, descriptor->inputs, descriptor->input_functions);
   if (!assigned) {
@@ -307,7 +310,5 @@ Task<Result<void>> ServoDrive::clear_position(MotionGuard guard) {
   if (!written) co_return failed(written.error());
   co_return Result<void>{};
 }
-
-Task<Result<std::string>> ServoDrive::change_serial(SerialChange /*change*/) { co_return lack(); }
 
 }  // namespace axisd::acme_s1

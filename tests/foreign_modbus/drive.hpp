@@ -3,7 +3,6 @@
 
 #include <array>
 #include <cstdint>
-#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -12,12 +11,11 @@
 #include "devices/canary.hpp"
 #include "devices/descriptor.hpp"
 #include "devices/drive.hpp"
-#include "devices/drive_access.hpp"
 
 namespace axisd::acme_s1 {
 
 /// The canary is the tag: two words that no power-up leaves (M6, M7). Thread: core.
-class ServoDrive final : public Drive {
+class ServoDrive final : public Drive, public MarksFacet {
  public:
   explicit ServoDrive(DriveContext context);
 
@@ -41,27 +39,7 @@ class ServoDrive final : public Drive {
   Task<Result<void>> clear_alarm(MotionGuard guard) override;
   Task<Result<void>> clear_position(MotionGuard guard) override;
 
-  // What it has not.
-  Task<Result<Drift>> check_drift(TransactionOptions) override { co_return Drift{}; }
-  [[nodiscard]] bool moves_by_itself() const override { return false; }
-  Task<Result<std::unique_ptr<LoadedMove>>> load_move(MoveProfile, MotionGuard) override { co_return lack(); }
-  [[nodiscard]] std::string configured_by(std::uint32_t) const override { return {}; }
-  Task<Result<std::vector<ParameterValue>>> read_parameters(std::vector<std::uint32_t>) override {
-    co_return lack();
-  }
-  Task<Result<std::vector<ParameterValue>>> write_parameters(std::vector<ParameterValue>) override {
-    co_return lack();
-  }
-  Task<Result<DriveSegments>> read_segments() override { co_return lack(); }
-  Task<Result<void>> write_segments(DriveSegments) override { co_return lack(); }
-  Task<Result<void>> save_parameters() override { co_return lack(); }
-  Task<Result<std::string>> restore_factory(std::vector<std::uint8_t>) override { co_return lack(); }
-  Task<Result<std::string>> change_serial(SerialChange change) override;
-
  private:
-  static std::unexpected<Error> lack() {
-    return fail(Reason::not_supported, "the ACME S1 has nothing like it", "do without it");
-  }
   using Tag = std::array<std::uint16_t, 2>;
   struct Setting {
     std::uint16_t address;

@@ -82,9 +82,10 @@ TEST(Cia402Parameters, SavesNothingThatIsNotPermitted) {
   EXPECT_GT(counted(), 0U);
   permitted = 0;
   asked = 0;
-  EXPECT_EQ(reason(bench.run(bench.drive().save_parameters())), Reason::eeprom_budget);
-  EXPECT_EQ(reason(bench.run(bench.drive().restore_factory({}))), Reason::eeprom_budget);
-  EXPECT_EQ(reason(bench.run(bench.drive().change_serial({.node = 40}))), Reason::eeprom_budget);
+  EXPECT_EQ(reason(bench.run(bench.drive().facets().memory->save_parameters())), Reason::eeprom_budget);
+  EXPECT_EQ(reason(bench.run(bench.drive().facets().memory->restore_factory({}))), Reason::eeprom_budget);
+  EXPECT_EQ(reason(bench.run(bench.drive().facets().serial->change_serial({.node = 40}))),
+            Reason::eeprom_budget);
   EXPECT_GT(asked, 1U + 1U + 3U) << "a new node-ID and the switch twice; and the configuration once more";
   EXPECT_TRUE(bench.run(bench.drive().configure())) << "nothing is to be saved";
   EXPECT_EQ(bench.simulated().eeprom_writes(), after);
@@ -144,7 +145,9 @@ TEST(Cia402Parameters, NamesTheOwnerOfEachObject) {
   auto setup = with_jog();
   setup.homing = HomingProfile{.velocity_rpm = 100, .search_velocity_rpm = 20};
   DriveBench bench({}, setup);
-  const auto owner = [&](canopen::Object object) { return bench.drive().configured_by(object.key()); };
+  const auto owner = [&](canopen::Object object) {
+    return bench.drive().facets().parameters->configured_by(object.key());
+  };
   EXPECT_EQ(owner(object::first_input_function), "inputs.X0");
   EXPECT_EQ(owner(object::microstep), "scale.microstep");
   EXPECT_EQ(owner(object::loop_mode), "drive.loop_mode");
@@ -173,7 +176,7 @@ TEST(Cia402Parameters, ReadsTheWholeDictionary) {
   std::vector<std::uint32_t> readable;
   for (const auto& one : yss_c::model().descriptor->parameters)
     if (one.access != Access::wo) readable.push_back(one.address);
-  const auto values = bench.run(bench.drive().read_parameters(readable));
+  const auto values = bench.run(bench.drive().facets().parameters->read_parameters(readable));
   ASSERT_TRUE(values) << to_string(values.error());
   EXPECT_GE(values->size() + 4, readable.size()) << "four are implied only";
   for (const auto& value : *values) {
@@ -188,7 +191,8 @@ TEST(Cia402Parameters, ReadsTheWholeDictionary) {
 TEST(Cia402Parameters, ReadsNegativeNumbersAsSuch) {
   DriveBench bench;
   bench.bring_up();
-  const auto written = bench.run(bench.drive().write_parameters({{object::homing_offset.key(), -300}}));
+  const auto written =
+      bench.run(bench.drive().facets().parameters->write_parameters({{object::homing_offset.key(), -300}}));
   ASSERT_TRUE(written) << to_string(written.error());
   EXPECT_EQ(written->front().value, -300);
   EXPECT_EQ(static_cast<std::int32_t>(bench.simulated().peek(object::homing_offset.key())), -300);
@@ -198,7 +202,8 @@ TEST(Cia402Parameters, WritesWhatDiffersAndReadsItBack) {
   DriveBench bench;
   bench.bring_up();
   const auto before = bench.simulated().eeprom_writes();
-  const auto written = bench.run(bench.drive().write_parameters({{lock_current, 30}, {speed_smoothing, 5}}));
+  const auto written = bench.run(
+      bench.drive().facets().parameters->write_parameters({{lock_current, 30}, {speed_smoothing, 5}}));
   ASSERT_TRUE(written) << to_string(written.error());
   EXPECT_EQ(*written, (std::vector<ParameterValue>{{lock_current, 30}, {speed_smoothing, 5}}));
   EXPECT_EQ(bench.simulated().peek(lock_current), 30U);
@@ -208,13 +213,13 @@ TEST(Cia402Parameters, WritesWhatDiffersAndReadsItBack) {
 TEST(Cia402Parameters, RefusalsNameObjectAndAbortCode) {
   DriveBench bench;
   bench.bring_up();
-  const auto missing = bench.run(bench.drive().read_parameters({0x209900}));
+  const auto missing = bench.run(bench.drive().facets().parameters->read_parameters({0x209900}));
   ASSERT_FALSE(missing);
   EXPECT_EQ(missing.error().where.object, 0x209900U);
   EXPECT_EQ(missing.error().where.native_code, 0x06020000U);
   EXPECT_EQ(to_string(missing.error()).find("2099h:00"), to_string(missing.error()).rfind("2099h:00"));
   EXPECT_THAT(to_string(missing.error()), HasSubstr("object 2099h:00: "));
-  const auto value = bench.run(bench.drive().write_parameters({{lock_current, 101}}));
+  const auto value = bench.run(bench.drive().facets().parameters->write_parameters({{lock_current, 101}}));
   ASSERT_FALSE(value);
   EXPECT_EQ(value.error().where.object, lock_current);
   EXPECT_EQ(value.error().where.native_code.value_or(0) & 0xFFFFFFF0U, 0x06090030U);
@@ -224,8 +229,8 @@ TEST(Cia402Parameters, SavesNothingThatMovesAfterAPowerUp) {
   DriveBench bench;
   bench.bring_up();
   bench.simulated().poke(object::target_speed.key(), 500);
-  ASSERT_TRUE(bench.run(bench.drive().write_parameters({{lock_current, 30}})));
-  const auto saved = bench.run(bench.drive().save_parameters());
+  ASSERT_TRUE(bench.run(bench.drive().facets().parameters->write_parameters({{lock_current, 30}})));
+  const auto saved = bench.run(bench.drive().facets().memory->save_parameters());
   ASSERT_TRUE(saved) << to_string(saved.error());
   EXPECT_GT(bench.drive().take_eeprom_writes().registers, 100U) << "all RW objects";
   EXPECT_TRUE(bench.run(bench.drive().check_continuity(TransactionClass::parameters))) << "another canary";
@@ -241,7 +246,7 @@ TEST(Cia402Parameters, SavesNothingThatMovesAfterAPowerUp) {
 TEST(Cia402Parameters, RestoresTheFactorySettingsAndSaysWhereItWillBe) {
   DriveBench bench;
   bench.bring_up();
-  const auto restored = bench.run(bench.drive().restore_factory({1, 2}));
+  const auto restored = bench.run(bench.drive().facets().memory->restore_factory({1, 2}));
   ASSERT_TRUE(restored) << to_string(restored.error());
   EXPECT_THAT(*restored, HasSubstr("node-ID 5 by its switches"));
   EXPECT_THAT(*restored, HasSubstr("1 Mbit/s with SW2 off"));
@@ -254,7 +259,7 @@ TEST(Cia402Parameters, RestoresTheFactorySettingsAndSaysWhereItWillBe) {
 TEST(Cia402Parameters, ADriveByItsOwnNodeIdIsUndefinedAfterRestoring) {
   DriveBench bench({.address = 33});
   bench.bring_up();
-  const auto restored = bench.run(bench.drive().restore_factory({}));
+  const auto restored = bench.run(bench.drive().facets().memory->restore_factory({}));
   ASSERT_TRUE(restored) << to_string(restored.error());
   EXPECT_THAT(*restored, HasSubstr("undefined (set the address switches first)"));
 }
@@ -262,7 +267,7 @@ TEST(Cia402Parameters, ADriveByItsOwnNodeIdIsUndefinedAfterRestoring) {
 TEST(Cia402Parameters, SavesAnotherNodeIdAndBitRateEvenWithoutPersist) {
   DriveBench bench;
   bench.bring_up();
-  const auto changed = bench.run(bench.drive().change_serial({.node = 40, .baud = 250'000}));
+  const auto changed = bench.run(bench.drive().facets().serial->change_serial({.node = 40, .baud = 250'000}));
   ASSERT_TRUE(changed) << to_string(changed.error());
   EXPECT_THAT(*changed, HasSubstr("all address switches off"));
   EXPECT_THAT(*changed, HasSubstr("SW2 on"));
@@ -277,7 +282,7 @@ TEST(Cia402Parameters, RefusesAddressesThatNoObjectCanHold) {
   DriveBench bench;
   bench.bring_up();
   const auto reason = [&](SerialChange change) {
-    const auto changed = bench.run(bench.drive().change_serial(change));
+    const auto changed = bench.run(bench.drive().facets().serial->change_serial(change));
     return changed ? Reason::internal : changed.error().reason;
   };
   EXPECT_EQ(reason({.node = 15}), Reason::out_of_range) << "by the switches only (4.4)";
@@ -290,8 +295,7 @@ TEST(Cia402Parameters, RefusesAddressesThatNoObjectCanHold) {
 TEST(Cia402Parameters, HasNoSegments) {
   DriveBench bench;
   bench.bring_up();
-  EXPECT_EQ(bench.run(bench.drive().read_segments()).error().reason, Reason::not_supported);
-  EXPECT_EQ(bench.run(bench.drive().write_segments({})).error().reason, Reason::not_supported);
+  EXPECT_EQ(bench.drive().facets().segments, nullptr);
 }
 
 }  // namespace

@@ -305,8 +305,8 @@ TEST(UnitCheck, TheRampOfAQuickStopIsReadFromTheDrive) {
   look(1'000'000);
   EXPECT_EQ(bench.drive().quick_stop_time(600), std::optional<Duration>(10ms));
   bench.answers()[quick_stop_ramp] = 2'000'000;  // as it is read back
-  const auto written =
-      bench.run(bench.drive().write_parameters({{.address = quick_stop_ramp, .value = 2'000'000}}));
+  const auto written = bench.run(bench.drive().facets().parameters->write_parameters(
+      {{.address = quick_stop_ramp, .value = 2'000'000}}));
   ASSERT_TRUE(written) << to_string(written.error());
   EXPECT_EQ(bench.drive().quick_stop_time(600), std::optional<Duration>(5ms)) << "it counts at once";
   look(1);
@@ -331,10 +331,10 @@ TEST(UnitCheck, WhoWritesParametersLeavesUnitsAlone) {
   UnitBench bench(
       with_objects({{"607Eh:00", 0}, {"60A8h:00", 0}, {"60A9h:00", in_pulses}, {"60AAh:00", 0}}, ""),
       {{velocity_si, in_pulses}});
-  EXPECT_EQ(bench.drive().configured_by(0x607E00), "scale.invert");
-  EXPECT_EQ(bench.drive().configured_by(position_si), "scale.microstep");
-  EXPECT_EQ(bench.drive().configured_by(velocity_si), "drive.velocity_unit");
-  EXPECT_EQ(bench.drive().configured_by(0x60AA00), "drive.acceleration_unit");
+  EXPECT_EQ(bench.drive().facets().parameters->configured_by(0x607E00), "scale.invert");
+  EXPECT_EQ(bench.drive().facets().parameters->configured_by(position_si), "scale.microstep");
+  EXPECT_EQ(bench.drive().facets().parameters->configured_by(velocity_si), "drive.velocity_unit");
+  EXPECT_EQ(bench.drive().facets().parameters->configured_by(0x60AA00), "drive.acceleration_unit");
 }
 
 }  // namespace
