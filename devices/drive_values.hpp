@@ -17,6 +17,9 @@ namespace axisd {
 
 struct DriveDescriptor;
 
+/// A drive that was told to start is expected to move within this; what it has not begun by then, it does not.
+inline constexpr Duration start_window = std::chrono::milliseconds(500);
+
 /// What the drive itself says it is doing.
 enum class DriveMode : std::uint8_t { positioning, homing, multi_position, multi_velocity };
 enum class PositionSource : std::uint8_t { unspecified, commanded, encoder };

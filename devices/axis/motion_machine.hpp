@@ -5,11 +5,9 @@
 #include <optional>
 
 #include "buses/clock.hpp"
+#include "devices/drive_values.hpp"
 
 namespace axisd {
-
-/// A drive that was told to start is expected to move within this.
-inline constexpr Duration start_window = std::chrono::milliseconds(500);
 
 /// Judges the readings of a motion that was started. It counts what a reading from after the start shows,
 /// and nothing older. Pure. Thread: core.

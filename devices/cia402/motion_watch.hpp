@@ -18,9 +18,6 @@ namespace axisd::cia402 {
 ///   any   -- stop(), forget() ------------------------------> rest
 class MotionWatch {
  public:
-  /// A motion that was triggered shows within this, or did not start.
-  static constexpr Duration start_window = std::chrono::milliseconds(500);
-
   /// Of a motion that was triggered; one that a terminal starts has none.
   enum class State : std::uint8_t { rest, begun, seen };
 
