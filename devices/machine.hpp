@@ -28,7 +28,7 @@ namespace axisd {
 
 /// What is known of a CAN network beside whether it is open. Counters since start.
 struct NetworkStatus {
-  can::LinkState link = can::LinkState::removed;
+  can::InterfaceState link = can::InterfaceState::removed;
   can::PortCounters frames{};
   canopen::SdoCounters sdo{};
   Duration sync_period{};  ///< 0: none is sent

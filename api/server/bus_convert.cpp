@@ -10,7 +10,7 @@
 namespace axisd::server {
 
 static_assert(std::to_underlying(BusKind::canopen) + 1 == v1::BusKind_MAX);
-static_assert(std::to_underlying(can::LinkState::stalled) + 1 == v1::NetworkLink_MAX);
+static_assert(std::to_underlying(can::InterfaceState::stalled) + 1 == v1::NetworkLink_MAX);
 
 void to_proto(const NetworkStatus& from, v1::NetworkStatus& to) {
   to.set_link(static_cast<v1::NetworkLink>(std::to_underlying(from.link) + 1));

@@ -24,14 +24,14 @@ void LinkTracker::forget() {
 
 void LinkTracker::removed() {
   forget();
-  state_ = {.link = LinkState::removed,
+  state_ = {.link = InterfaceState::removed,
             .error = error(Reason::bus_down, fmt::format("there is no CAN interface {}", interface_),
                            "connect the adapter, or correct the interface's name (ip link show type can)")};
 }
 
 void LinkTracker::down() {
   forget();
-  state_ = {.link = LinkState::down,
+  state_ = {.link = InterfaceState::down,
             .error = error(Reason::bus_down, fmt::format("CAN interface {} is down", interface_),
                            fmt::format("configure it and set it up (ip link set {} up)", interface_))};
 }
@@ -39,7 +39,7 @@ void LinkTracker::down() {
 void LinkTracker::unusable(Error why) {
   forget();
   why.where.bus = bus_;
-  state_ = {.link = LinkState::down, .error = std::move(why)};
+  state_ = {.link = InterfaceState::down, .error = std::move(why)};
 }
 
 void LinkTracker::up(std::optional<Error> objection) {
@@ -69,23 +69,23 @@ void LinkTracker::conclude() {
           : fmt::format("mend the cause; then the link goes down and up (ip link set {} down, up)",
                         interface_);
   if (bus_off_) {
-    state_ = {.link = LinkState::bus_off,
+    state_ = {.link = InterfaceState::bus_off,
               .error = error(Reason::bus_down,
                              fmt::format("CAN interface {} is bus-off: too many errors", interface_),
                              "check wiring, termination and bit rate; " + cycle)};
   } else if (stalled_) {
-    state_ = {.link = LinkState::stalled,
+    state_ = {.link = InterfaceState::stalled,
               .error = error(Reason::bus_down,
                              fmt::format("CAN interface {} takes frames, but does not send them", interface_),
                              "check that another node is powered, the wiring and the adapter; " + cycle)};
   } else if (objection_) {
-    state_ = {.link = LinkState::down, .error = objection_};
+    state_ = {.link = InterfaceState::down, .error = objection_};
   } else if (passive_) {
-    state_ = {.link = LinkState::error_passive,
+    state_ = {.link = InterfaceState::error_passive,
               .error = error(Reason::bus_down, fmt::format("CAN interface {} is error-passive", interface_),
                              "check wiring, termination, bit rate and that another node is powered")};
   } else {
-    state_ = {.link = LinkState::up, .error = std::nullopt};
+    state_ = {.link = InterfaceState::up, .error = std::nullopt};
   }
 }
 

@@ -137,7 +137,7 @@ void NetworkPort::set_up(bool up) {
   present_ = true;
   wanted_up_ = up;
   const auto link = tracker().state().link;
-  const bool is_up = link != LinkState::down && link != LinkState::removed;
+  const bool is_up = link != InterfaceState::down && link != InterfaceState::removed;
   if (!open_ || (up && is_up)) return;
   leave();
   if (up) {

@@ -96,19 +96,19 @@ std::string_view to_string(SendStatus status) {
   return "unknown";
 }
 
-std::string_view to_string(LinkState state) {
+std::string_view to_string(InterfaceState state) {
   switch (state) {
-    case LinkState::removed:
+    case InterfaceState::removed:
       return "removed";
-    case LinkState::down:
+    case InterfaceState::down:
       return "down";
-    case LinkState::up:
+    case InterfaceState::up:
       return "up";
-    case LinkState::error_passive:
+    case InterfaceState::error_passive:
       return "error_passive";
-    case LinkState::bus_off:
+    case InterfaceState::bus_off:
       return "bus_off";
-    case LinkState::stalled:
+    case InterfaceState::stalled:
       break;
   }
   return "stalled";

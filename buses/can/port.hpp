@@ -78,7 +78,7 @@ using Completion = std::function<void(const SendResult&)>;
 /// What a caller is told about a frame that was not sent, or perhaps not. Precondition: status is not `sent`.
 Error error_of(const SendResult& result, const std::string& bus, const Frame& frame);
 
-enum class LinkState : std::uint8_t {
+enum class InterfaceState : std::uint8_t {
   removed,        ///< there is no such interface
   down,           ///< the interface is down, or up with settings that forbid using it (`error` says which)
   up,             ///< can send
@@ -86,17 +86,21 @@ enum class LinkState : std::uint8_t {
   bus_off,        ///< the controller took itself off the network; needs a cycle
   stalled,        ///< frames are handed over and not confirmed; needs a cycle
 };
-std::string_view to_string(LinkState state);
+std::string_view to_string(InterfaceState state);
 
 struct PortState {
-  LinkState link = LinkState::removed;
+  InterfaceState link = InterfaceState::removed;
   std::optional<Error> error;  ///< why it cannot send, or what is wrong though it can; none with `up`
 
-  [[nodiscard]] bool can_send() const { return link == LinkState::up || link == LinkState::error_passive; }
+  [[nodiscard]] bool can_send() const {
+    return link == InterfaceState::up || link == InterfaceState::error_passive;
+  }
   /// Nothing is sent until the link was taken down and up again: that alone empties the kernel's queue of
   /// frames that would otherwise go out when the network comes back (M26). The port does not do it: it takes
   /// privileges.
-  [[nodiscard]] bool needs_cycle() const { return link == LinkState::bus_off || link == LinkState::stalled; }
+  [[nodiscard]] bool needs_cycle() const {
+    return link == InterfaceState::bus_off || link == InterfaceState::stalled;
+  }
 };
 
 /// The name that stands for a network in this process.

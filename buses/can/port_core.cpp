@@ -62,8 +62,8 @@ void PortCore::link_changed() {
   const auto& state = tracker_.state();
   if (known_ && same(state, *known_)) return;
   const bool other_link = !known_ || state.link != known_->link;
-  if (other_link && state.link == LinkState::bus_off) ++counters_.bus_offs;
-  if (other_link && state.link == LinkState::stalled) ++counters_.stalls;
+  if (other_link && state.link == InterfaceState::bus_off) ++counters_.bus_offs;
+  if (other_link && state.link == InterfaceState::stalled) ++counters_.stalls;
   if (!state.can_send()) queue_.end_all();
   collect();
   known_ = state;

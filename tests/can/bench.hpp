@@ -45,7 +45,7 @@ class Bench {
   /// Runs the core thread until `condition` holds; false: it did not within a time that it surely should
   /// have.
   bool until(const std::function<bool()>& condition);
-  bool until(LinkState link) {
+  bool until(InterfaceState link) {
     return until([this, link] { return port.state().link == link; });
   }
   bool until_ended(std::size_t count) {
@@ -62,7 +62,7 @@ class Bench {
   SocketCanPort port;
   Endings endings;
   std::vector<ReceivedFrame> received;
-  std::vector<LinkState> states;
+  std::vector<InterfaceState> states;
   bool patient = false;  ///< frames may gather
 };
 

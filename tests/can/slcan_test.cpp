@@ -35,7 +35,7 @@ TEST(Slcan, ABitRateThatDiffersIsAnErrorAndNothingIsSent) {
   Bench bench(settings_for(adapter, 500'000));
   bench.start();
   ASSERT_TRUE(bench.until([&] { return !bench.states.empty(); }));
-  EXPECT_EQ(bench.port.state().link, LinkState::down);
+  EXPECT_EQ(bench.port.state().link, InterfaceState::down);
   EXPECT_EQ(bench.port.state().error->reason, Reason::misconfigured);
   EXPECT_NE(bench.port.state().error->message.find("250000"), std::string::npos);
   bench.send(1);
@@ -43,7 +43,7 @@ TEST(Slcan, ABitRateThatDiffersIsAnErrorAndNothingIsSent) {
   EXPECT_EQ(bench.endings.texts(), Texts{"1:port_down"});
   ip("link set " + adapter.interface() + " down\nlink set " + adapter.interface() +
      " type can bitrate 500000\nlink set " + adapter.interface() + " up");
-  ASSERT_TRUE(bench.until(LinkState::up));
+  ASSERT_TRUE(bench.until(InterfaceState::up));
   bench.send(2);
   EXPECT_EQ(taken(bench, adapter), "t002");
 }
@@ -53,7 +53,7 @@ TEST(Slcan, WhatAStalledAdapterDidNotTakeIsNeverSent) {
   ip("link set " + adapter.interface() + " up");
   Bench bench(settings_for(adapter));
   bench.start();
-  ASSERT_TRUE(bench.until(LinkState::up));
+  ASSERT_TRUE(bench.until(InterfaceState::up));
   bench.send(0x100);
   ASSERT_TRUE(bench.until_ended(1));
   ASSERT_EQ(taken(bench, adapter), "t100");
@@ -61,7 +61,7 @@ TEST(Slcan, WhatAStalledAdapterDidNotTakeIsNeverSent) {
   adapter.set_stalled(true);
   bench.linger();
   for (std::uint32_t id = 0x101; id <= 0x108; ++id) bench.send(id);
-  ASSERT_TRUE(bench.until(LinkState::stalled));
+  ASSERT_TRUE(bench.until(InterfaceState::stalled));
   ASSERT_TRUE(bench.until_ended(9));
   // The echoes came at once here, but they are no proof while the kernel holds frames.
   EXPECT_EQ(bench.endings.texts(),
@@ -74,7 +74,7 @@ TEST(Slcan, WhatAStalledAdapterDidNotTakeIsNeverSent) {
   ip("link set " + adapter.interface() + " down");
   adapter.set_stalled(false);
   ip("link set " + adapter.interface() + " up");
-  ASSERT_TRUE(bench.until(LinkState::up));
+  ASSERT_TRUE(bench.until(InterfaceState::up));
   bench.linger();
   EXPECT_EQ(adapter.taken(), "t101");  // it had left the kernel before
   bench.send(0x111, TransactionClass::stop);
@@ -89,7 +89,7 @@ TEST(Slcan, BacksOffWhileOthersFillTheQueueAndSendsThen) {
   settings.stall_timeout = 5s;
   Bench bench(settings);
   bench.start();
-  ASSERT_TRUE(bench.until(LinkState::up));
+  ASSERT_TRUE(bench.until(InterfaceState::up));
   adapter.set_stalled(true);
   bench.linger();
   Peer peer(adapter.interface());
@@ -111,20 +111,20 @@ TEST(Slcan, AQueueThatStaysFullIsAStall) {
   ip("link set " + adapter.interface() + " up");
   Bench bench(settings_for(adapter));
   bench.start();
-  ASSERT_TRUE(bench.until(LinkState::up));
+  ASSERT_TRUE(bench.until(InterfaceState::up));
   adapter.set_stalled(true);
   bench.linger();
   Peer peer(adapter.interface());
   for (int filled = 0; filled < 100 && peer.send(frame_of(0x500)); ++filled) {
   }
   bench.send(1);
-  ASSERT_TRUE(bench.until(LinkState::stalled));
+  ASSERT_TRUE(bench.until(InterfaceState::stalled));
   ASSERT_TRUE(bench.until_ended(1));
   EXPECT_EQ(bench.endings.texts(), Texts{"1:port_down"});  // known not to be sent
   ip("link set " + adapter.interface() + " down");
   adapter.set_stalled(false);
   ip("link set " + adapter.interface() + " up");
-  ASSERT_TRUE(bench.until(LinkState::up));
+  ASSERT_TRUE(bench.until(InterfaceState::up));
   bench.linger();
   EXPECT_EQ(adapter.taken().find("t001"), std::string::npos);
 }
@@ -134,16 +134,16 @@ TEST(Slcan, BusOffOfTheControllerLastsUntilTheCycle) {
   ip("link set " + adapter.interface() + " up");
   Bench bench(settings_for(adapter));
   bench.start();
-  ASSERT_TRUE(bench.until(LinkState::up));
+  ASSERT_TRUE(bench.until(InterfaceState::up));
   adapter.say("sp130010\r");
-  ASSERT_TRUE(bench.until(LinkState::error_passive));
+  ASSERT_TRUE(bench.until(InterfaceState::error_passive));
   adapter.say("sb000256\r");
-  ASSERT_TRUE(bench.until(LinkState::bus_off));
+  ASSERT_TRUE(bench.until(InterfaceState::bus_off));
   bench.send(1);  // the kernel would take and drop it
   ASSERT_TRUE(bench.until_ended(1));
   EXPECT_EQ(bench.endings.texts(), Texts{"1:port_down"});
   ip("link set " + adapter.interface() + " down\nlink set " + adapter.interface() + " up");
-  ASSERT_TRUE(bench.until(LinkState::up));
+  ASSERT_TRUE(bench.until(InterfaceState::up));
   bench.send(2, TransactionClass::stop);
   EXPECT_EQ(taken(bench, adapter), "t002");
 }
@@ -154,14 +154,14 @@ TEST(Slcan, BusOffOfBeforeTheStartIsSeen) {
   {
     Bench bench(settings_for(adapter));
     bench.start();
-    ASSERT_TRUE(bench.until(LinkState::up));
+    ASSERT_TRUE(bench.until(InterfaceState::up));
     adapter.say("sb000256\r");
-    ASSERT_TRUE(bench.until(LinkState::bus_off));
+    ASSERT_TRUE(bench.until(InterfaceState::bus_off));
   }
   Bench bench(settings_for(adapter));
   bench.start();
   ASSERT_TRUE(bench.until([&] { return !bench.states.empty(); }));
-  EXPECT_EQ(bench.states, std::vector<LinkState>{LinkState::bus_off});
+  EXPECT_EQ(bench.states, std::vector<InterfaceState>{InterfaceState::bus_off});
 }
 
 TEST(Slcan, AnAdapterThatIsUnpluggedIsRemoved) {
@@ -169,9 +169,9 @@ TEST(Slcan, AnAdapterThatIsUnpluggedIsRemoved) {
   ip("link set " + adapter->interface() + " up");
   Bench bench(settings_for(*adapter));
   bench.start();
-  ASSERT_TRUE(bench.until(LinkState::up));
+  ASSERT_TRUE(bench.until(InterfaceState::up));
   adapter.reset();
-  EXPECT_TRUE(bench.until(LinkState::removed));
+  EXPECT_TRUE(bench.until(InterfaceState::removed));
 }
 
 }  // namespace

@@ -14,7 +14,7 @@ using test::frame_of;
 using test::ip;
 using test::Peer;
 using test::settings_of;
-using States = std::vector<LinkState>;
+using States = std::vector<InterfaceState>;
 using Texts = std::vector<std::string>;
 
 class Vcan : public ::testing::Test {
@@ -22,7 +22,7 @@ class Vcan : public ::testing::Test {
   Vcan() {
     ip("link add cell type vcan\nlink set cell up");
     bench.start();
-    EXPECT_TRUE(bench.until(LinkState::up));
+    EXPECT_TRUE(bench.until(InterfaceState::up));
   }
   ~Vcan() override { ip("link del cell"); }
 
@@ -74,9 +74,9 @@ TEST_F(Vcan, FramesThatGatherComeInOrderWithTheirOwnTimes) {
   EXPECT_EQ(bench.endings.texts(), Texts{"1:sent"});
   ASSERT_TRUE(peer.send(frame_of(1)));
   ip("link set cell down");
-  ASSERT_TRUE(bench.until(LinkState::down));
+  ASSERT_TRUE(bench.until(InterfaceState::down));
   ip("link set cell up");
-  ASSERT_TRUE(bench.until(LinkState::up));
+  ASSERT_TRUE(bench.until(InterfaceState::up));
   const auto before = bench.received.size();
   ASSERT_TRUE(bench.until([&] { return peer.send(frame_of(2)); }));
   ASSERT_TRUE(bench.until([&] { return bench.received.size() > before; }));
@@ -94,13 +94,13 @@ TEST_F(Vcan, SendsAgainAfterDownAndUpButNothingOfBefore) {
   Peer peer("cell");
   ip("link set cell down");
   bench.send(1);  // the port does not know yet
-  ASSERT_TRUE(bench.until(LinkState::down));
+  ASSERT_TRUE(bench.until(InterfaceState::down));
   bench.send(2);
   ASSERT_TRUE(bench.until_ended(2));
   EXPECT_EQ(bench.endings.texts(), (Texts{"1:port_down", "2:port_down"}));
   EXPECT_NE(bench.port.state().error->message.find("down"), std::string::npos);
   ip("link set cell up");
-  ASSERT_TRUE(bench.until(LinkState::up));
+  ASSERT_TRUE(bench.until(InterfaceState::up));
   bench.linger();
   peer.received();  // ends the error that a plain socket has pending
   bench.send(3);
@@ -115,17 +115,17 @@ TEST_F(Vcan, SeesAnInterfaceThatWasDownForAMoment) {
   ip("link set cell down\nlink set cell up");
   ASSERT_TRUE(bench.until([&] { return bench.states.size() >= 3; }));
   bench.linger();
-  EXPECT_EQ(bench.states, (States{LinkState::up, LinkState::down, LinkState::up}));
+  EXPECT_EQ(bench.states, (States{InterfaceState::up, InterfaceState::down, InterfaceState::up}));
 }
 
 TEST_F(Vcan, SendsAndReceivesOnAnInterfaceCreatedAnew) {
   ip("link del cell");
-  ASSERT_TRUE(bench.until(LinkState::removed));
+  ASSERT_TRUE(bench.until(InterfaceState::removed));
   bench.send(1);
   ASSERT_TRUE(bench.until_ended(1));
   EXPECT_EQ(bench.endings.texts(), Texts{"1:port_down"});
   ip("link add cell type vcan\nlink set cell up");
-  ASSERT_TRUE(bench.until(LinkState::up));
+  ASSERT_TRUE(bench.until(InterfaceState::up));
   Peer peer("cell");
   bench.send(2);
   EXPECT_TRUE(peer.send(frame_of(3)));
@@ -145,18 +145,18 @@ TEST_F(Vcan, SeesAnInterfaceReplacedInAMoment) {
 
 TEST_F(Vcan, FollowsTheNameNotTheInterface) {
   ip("link set cell down\nlink set cell name other\nlink set other up");
-  ASSERT_TRUE(bench.until(LinkState::removed));
+  ASSERT_TRUE(bench.until(InterfaceState::removed));
   bench.linger();
-  EXPECT_EQ(bench.port.state().link, LinkState::removed);
+  EXPECT_EQ(bench.port.state().link, InterfaceState::removed);
   ip("link set other down\nlink set other name cell\nlink set cell up");
-  EXPECT_TRUE(bench.until(LinkState::up));
+  EXPECT_TRUE(bench.until(InterfaceState::up));
 }
 
 TEST_F(Vcan, AfterBusOffNothingIsSentUntilTheLinkWasCycled) {
   Peer peer("cell");
   for (std::uint32_t id = 1; id <= 6; ++id) bench.send(id);
   peer.report_error(CAN_ERR_BUSOFF);
-  ASSERT_TRUE(bench.until(LinkState::bus_off));
+  ASSERT_TRUE(bench.until(InterfaceState::bus_off));
   ASSERT_TRUE(bench.until_ended(6));
   peer.received();
   peer.report_error(CAN_ERR_RESTARTED);  // a controller that restarts by itself changes nothing
@@ -168,7 +168,7 @@ TEST_F(Vcan, AfterBusOffNothingIsSentUntilTheLinkWasCycled) {
   EXPECT_TRUE(peer.received().empty());
   EXPECT_TRUE(bench.port.state().needs_cycle());
   ip("link set cell down\nlink set cell up");
-  ASSERT_TRUE(bench.until(LinkState::up));
+  ASSERT_TRUE(bench.until(InterfaceState::up));
   peer.received();
   bench.send(8);
   ASSERT_TRUE(bench.until_ended(8));
@@ -179,12 +179,12 @@ TEST_F(Vcan, AfterBusOffNothingIsSentUntilTheLinkWasCycled) {
 TEST_F(Vcan, ErrorPassiveIsToldAndStillSends) {
   Peer peer("cell");
   peer.report_error(CAN_ERR_CRTL, CAN_ERR_CRTL_TX_PASSIVE);
-  ASSERT_TRUE(bench.until(LinkState::error_passive));
+  ASSERT_TRUE(bench.until(InterfaceState::error_passive));
   bench.send(1);
   ASSERT_TRUE(bench.until_ended(1));
   EXPECT_EQ(bench.endings.texts(), Texts{"1:sent"});
   peer.report_error(CAN_ERR_CRTL, CAN_ERR_CRTL_ACTIVE);
-  EXPECT_TRUE(bench.until(LinkState::up));
+  EXPECT_TRUE(bench.until(InterfaceState::up));
   EXPECT_EQ(bench.port.counters().error_frames, 2U);
   EXPECT_TRUE(bench.received.empty());  // error frames are no frames
 }
@@ -225,12 +225,12 @@ TEST(SocketCan, WaitsForAnInterfaceThatIsNotThereYet) {
   Bench bench(settings_of("later"));
   bench.start();
   ASSERT_TRUE(bench.until([&] { return !bench.states.empty(); }));
-  EXPECT_EQ(bench.states, States{LinkState::removed});
+  EXPECT_EQ(bench.states, States{InterfaceState::removed});
   EXPECT_NE(bench.port.state().error->message.find("later"), std::string::npos);
   ip("link add later type vcan");
-  ASSERT_TRUE(bench.until(LinkState::down));
+  ASSERT_TRUE(bench.until(InterfaceState::down));
   ip("link set later up");
-  EXPECT_TRUE(bench.until(LinkState::up));
+  EXPECT_TRUE(bench.until(InterfaceState::up));
   ip("link del later");
 }
 
@@ -238,7 +238,7 @@ TEST(SocketCan, RefusesWhatCarriesNoCanAndWhatIsNoName) {
   for (const auto* name : {"lo", "a-name-that-is-too-long"}) {
     Bench bench(settings_of(name));
     bench.start();
-    ASSERT_TRUE(bench.until(LinkState::down)) << name;
+    ASSERT_TRUE(bench.until(InterfaceState::down)) << name;
     EXPECT_EQ(bench.port.state().error->reason, Reason::misconfigured) << name;
   }
 }
@@ -248,8 +248,8 @@ TEST(SocketCan, PortsOnOneInterfaceHearEachOther) {
   Bench other(settings_of("vcan0"));
   one.start();
   other.start();
-  ASSERT_TRUE(one.until(LinkState::up));
-  ASSERT_TRUE(other.until(LinkState::up));
+  ASSERT_TRUE(one.until(InterfaceState::up));
+  ASSERT_TRUE(other.until(InterfaceState::up));
   one.send(0x123);
   ASSERT_TRUE(one.until_ended(1));
   ASSERT_TRUE(other.until([&] { return other.received.size() == 1; }));

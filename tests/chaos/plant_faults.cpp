@@ -73,7 +73,7 @@ void Plant::mend_network() {
   nodes_->nodes().clear_faults();
   nodes_->nodes().set_connected(true);
   network_->set_stalled(false);
-  if (port_->state().link == can::LinkState::down) port_->set_up(true);
+  if (port_->state().link == can::InterfaceState::down) port_->set_up(true);
 }
 
 void Plant::bound(const std::string& line, const test::WireEntry& entry) {

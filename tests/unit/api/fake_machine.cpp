@@ -278,7 +278,7 @@ void FakeMachine::buses(std::function<void(std::vector<BusStatus>)> callback) {
   BusStatus status{
       .name = "line-a", .port = "sim", .baud = 115200, .open = true, .simulated = true, .error = {}};
   status.counters.timeouts = 7;
-  NetworkStatus network{.link = can::LinkState::bus_off,
+  NetworkStatus network{.link = can::InterfaceState::bus_off,
                         .sync_period = 10ms,
                         .sync_running = true,
                         .emergencies = 3,

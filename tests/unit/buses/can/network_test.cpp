@@ -22,7 +22,7 @@ struct BenchOf {
   Port port{world.clock(), {.bus = "cell", .interface = "sim", .stall_timeout = 100ms}, network};
   test::Endings endings;
   Texts received;  ///< by the port
-  std::vector<LinkState> states;
+  std::vector<InterfaceState> states;
   Texts others;  ///< received by another node
   std::vector<TimePoint> at;
   Network::Id node = network.join([this](const Frame& frame, TimePoint when, bool own) {
@@ -41,7 +41,7 @@ struct BenchOf {
   }
 };
 using Bench = BenchOf<NetworkPort>;
-using States = std::vector<LinkState>;
+using States = std::vector<InterfaceState>;
 
 /// As an interface with IFF_ECHO: what is in a mailbox of the controller is in no memory of the kernel.
 struct WithMailboxes : NetworkPort {
@@ -52,7 +52,7 @@ struct WithMailboxes : NetworkPort {
 
 TEST(CanNetwork, CarriesFramesInTheTimeTheyTake) {
   Bench bench;
-  EXPECT_EQ(bench.states, States{LinkState::up});
+  EXPECT_EQ(bench.states, States{InterfaceState::up});
   const auto begin = bench.world.now();
   bench.send(0x123);
   EXPECT_TRUE(bench.endings.texts().empty());  // never from within send()
@@ -130,7 +130,7 @@ TEST(CanPort, InAStallAllEndsAndNothingIsSentLater) {
   bench.world.run_for(2ms);
   EXPECT_EQ(bench.endings.texts(),
             (Texts{"1:unknown", "2:unknown", "3:unknown", "4:unknown", "5:port_down", "6:port_down"}));
-  EXPECT_EQ(bench.states, (States{LinkState::up, LinkState::stalled}));
+  EXPECT_EQ(bench.states, (States{InterfaceState::up, InterfaceState::stalled}));
   bench.send(7, options_of(Class::stop));
   bench.world.run_for(1ms);
   EXPECT_EQ(bench.endings.texts().back(), "7:port_down");
@@ -139,7 +139,8 @@ TEST(CanPort, InAStallAllEndsAndNothingIsSentLater) {
   bench.network.set_stalled(false);
   bench.world.run_for(100ms);
   EXPECT_TRUE(bench.others.empty());
-  EXPECT_EQ(bench.states, (States{LinkState::up, LinkState::stalled, LinkState::down, LinkState::up}));
+  EXPECT_EQ(bench.states,
+            (States{InterfaceState::up, InterfaceState::stalled, InterfaceState::down, InterfaceState::up}));
   bench.send(8);
   bench.world.run_for(1ms);
   EXPECT_EQ(bench.others, Texts{"008#"});
@@ -158,7 +159,7 @@ TEST(CanPort, AFrameThatVanishesEndsAsUnknownAndTheRestGoesOn) {
   EXPECT_EQ(std::ranges::count(bench.endings.texts(), "1:unknown"), 1);
   EXPECT_EQ(bench.endings.texts().size(), 21U);
   EXPECT_EQ(bench.others.size(), 20U);
-  EXPECT_EQ(bench.states, States{LinkState::up}) << "no stall";
+  EXPECT_EQ(bench.states, States{InterfaceState::up}) << "no stall";
 }
 
 /// Nobody acknowledges it: it would move a shaft as soon as somebody does (M26).
@@ -168,7 +169,7 @@ TEST(CanPort, AFrameInAMailboxIsNotGivenUpButFlushed) {
   bench.send(1);
   bench.world.run_for(101ms);
   EXPECT_EQ(bench.endings.texts(), Texts{"1:unknown"});
-  EXPECT_EQ(bench.states, (States{LinkState::up, LinkState::stalled}));
+  EXPECT_EQ(bench.states, (States{InterfaceState::up, InterfaceState::stalled}));
   bench.port.cycle();
   bench.network.set_stalled(false);
   bench.world.run_for(100ms);
@@ -185,10 +186,10 @@ TEST(CanPort, AFrameThatMayBeInAMailboxIsAStallThoughOthersComeBack) {
     bench.world.run_for(10ms);
   }
   EXPECT_EQ(std::ranges::count(bench.endings.texts(), "1:unknown"), 0);
-  EXPECT_EQ(bench.states, States{LinkState::up});
+  EXPECT_EQ(bench.states, States{InterfaceState::up});
   bench.world.run_for(11ms);
   EXPECT_EQ(std::ranges::count(bench.endings.texts(), "1:unknown"), 1);
-  EXPECT_EQ(bench.states, (States{LinkState::up, LinkState::stalled}));
+  EXPECT_EQ(bench.states, (States{InterfaceState::up, InterfaceState::stalled}));
 }
 
 /// As `ip link set can0 up` on a link that is up.
@@ -201,7 +202,7 @@ TEST(CanPort, ToSetItUpTwiceLosesNothing) {
   bench.port.report(Controller::bus_off);
   bench.port.set_up(true);
   bench.world.run_for(10ms);
-  EXPECT_EQ(bench.states.back(), LinkState::bus_off) << "it has to go down first";
+  EXPECT_EQ(bench.states.back(), InterfaceState::bus_off) << "it has to go down first";
 }
 
 TEST(CanNetwork, ALateHostMakesTheWireNoSlower) {
@@ -243,7 +244,7 @@ TEST(CanPort, ALateHostIsNoStall) {
     bench.world.clock().advance_to(bench.world.now() + 150ms);
     bench.world.run_for(1ms);
   }
-  EXPECT_EQ(bench.states, States{LinkState::up});
+  EXPECT_EQ(bench.states, States{InterfaceState::up});
   EXPECT_EQ(bench.port.counters().stalls, 0U);
   EXPECT_EQ(bench.port.counters().sent, 20U);
 }
@@ -281,8 +282,8 @@ TEST(CanPort, FollowsAnInterfaceThatGoesAndComes) {
   bench.send(3);
   bench.world.run_for(1ms);
   EXPECT_EQ(bench.endings.texts(), (Texts{"1:sent", "2:port_down", "3:sent"}));
-  EXPECT_EQ(bench.states,
-            (States{LinkState::up, LinkState::error_passive, LinkState::removed, LinkState::up}));
+  EXPECT_EQ(bench.states, (States{InterfaceState::up, InterfaceState::error_passive, InterfaceState::removed,
+                                  InterfaceState::up}));
   EXPECT_EQ(bench.port.counters().openings, 2U);
 }
 

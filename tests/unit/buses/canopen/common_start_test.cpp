@@ -26,7 +26,7 @@ struct Start {
                                      NetworkSettings{.name = "can0", .sync_period = period}, std::move(made));
     bus->start();
     for (std::uint8_t i = 0; i < count; ++i) EXPECT_TRUE(bus->attach(node(i), {}));
-    port->set_link(can::LinkState::up);
+    port->set_link(can::InterfaceState::up);
     for (std::uint8_t i = 0; i < count; ++i) bus->set_readiness(node(i), settled);
   }
   ~Start() {
@@ -276,9 +276,9 @@ TEST(CommonStart, TheLinkGoesDownMeanwhile) {
   Start start(10ms);
   start.launch();
   start.world.run_for(50us);
-  start.port->set_link(can::LinkState::bus_off);
+  start.port->set_link(can::InterfaceState::bus_off);
   EXPECT_FALSE(start.finish());
-  start.port->set_link(can::LinkState::up);
+  start.port->set_link(can::InterfaceState::up);
   start.world.run_for(1s);
   EXPECT_EQ(start.syncs(), 0) << "nobody was settled";
 }

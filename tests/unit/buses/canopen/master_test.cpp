@@ -71,7 +71,7 @@ TEST(Master, MissesAHeartbeatOnlyAfterTheFirst) {
   EXPECT_EQ(net.master->nmt().status(1).state, NmtState::unknown);
   net.port->receive(0x701, Bytes{4});
   EXPECT_EQ(net.events.back().kind, Kind::heartbeat_again);
-  net.port->set_link(can::LinkState::down);
+  net.port->set_link(can::InterfaceState::down);
   net.world.run_for(1s);
   EXPECT_EQ(net.events.size(), 3U);  // without a link silence says nothing
 }
@@ -170,8 +170,8 @@ TEST(Sync, KeepsItsTimesAndStopsWithTheLink) {
   EXPECT_EQ(seen.back() - begin, 1s + net.port->frame_time);
   EXPECT_EQ(net.port->log.front(), "080#");
   EXPECT_EQ(net.master->sync().counters().missed, 0U);
-  net.port->set_link(can::LinkState::stalled);
-  net.port->set_link(can::LinkState::up);
+  net.port->set_link(can::InterfaceState::stalled);
+  net.port->set_link(can::InterfaceState::up);
   net.world.run_for(1s);
   EXPECT_EQ(seen.size(), 100U);
   EXPECT_FALSE(net.master->sync().running());

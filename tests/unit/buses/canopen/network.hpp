@@ -21,7 +21,7 @@ using axisd::test::VirtualWorld;
 /// Takes every frame at once and confirms it after `frame_time`.
 class FakePort final : public can::Port {
  public:
-  explicit FakePort(VirtualWorld& world) : world_(&world) { state_.link = can::LinkState::up; }
+  explicit FakePort(VirtualWorld& world) : world_(&world) { state_.link = can::InterfaceState::up; }
 
   void start(can::PortHandlers handlers) override { handlers_ = std::move(handlers); }
   void send(const can::Frame& frame, const can::SendOptions& options, can::Completion completion) override {
@@ -55,7 +55,7 @@ class FakePort final : public can::Port {
     handlers_.on_frame({.frame = frame, .at = world_->now()});
   }
   void receive(std::uint32_t id, const SdoData& data) { receive(id, Bytes(data.begin(), data.end())); }
-  void set_link(can::LinkState link) {
+  void set_link(can::InterfaceState link) {
     state_.link = link;
     handlers_.on_state(state_);
   }

@@ -49,7 +49,7 @@ TEST(SdoClasses, CountEachAttemptAndNotWhatBringsANodeInStep) {
   net.upload("gone", 1, status);
   net.upload("queued", 1, status);
   net.world.run_for(10us);
-  net.port->set_link(can::LinkState::down);
+  net.port->set_link(can::InterfaceState::down);
   net.world.run_for(10ms);
   EXPECT_EQ(net.counted(TransactionClass::parameters).drops.port_lost, 2U);
   EXPECT_EQ(net.counted(TransactionClass::parameters).sent, 2U);

@@ -350,7 +350,7 @@ TEST(SdoClient, WithoutALinkEverythingEnds) {
   net.download("write", 1, control, {6, 0});
   net.upload("waits", 1, status);
   net.world.run_for(5ms);
-  net.port->set_link(can::LinkState::bus_off);
+  net.port->set_link(can::InterfaceState::bus_off);
   net.upload("later", 1, status);
   net.world.run_for(5ms);
   EXPECT_EQ(net.results.at("write").error().outcome, Outcome::unknown);

@@ -22,7 +22,7 @@ namespace {
 
 using namespace std::chrono_literals;
 using can::Controller;
-using can::LinkState;
+using can::InterfaceState;
 
 /// A machine with one CAN network, and somebody who is asked for cycles of its link.
 class Links : public testing::Test {
@@ -96,7 +96,7 @@ class Links : public testing::Test {
     asked_at_.clear();
     port_->report(Controller::bus_off);
   }
-  [[nodiscard]] LinkState link() const { return port_->state().link; }
+  [[nodiscard]] InterfaceState link() const { return port_->state().link; }
 
   test::VirtualWorld world_;
   can::Network network_{world_.clock(), 1'000'000};
@@ -126,7 +126,7 @@ TEST_F(Links, ThatNobodyWouldCycleIsToldAsLongAsItIsSo) {
   helper_ = Helper::cycles;
   world_.run_for(LinkCycler::check_period);
   EXPECT_EQ(told(), "");
-  EXPECT_EQ(machine_->bus_status().at(0).network->link, LinkState::up);
+  EXPECT_EQ(machine_->bus_status().at(0).network->link, InterfaceState::up);
 }
 
 TEST_F(Links, WhatIsWrongWithALinkIsLoggedWhenItChanges) {
@@ -158,7 +158,7 @@ TEST_F(Links, BusOffDoesNotWaitForTheAnswerOfACheck) {
   go_bus_off();
   world_.run_for(200ms);
   EXPECT_EQ(asked_at_, Times{0});
-  EXPECT_EQ(link(), LinkState::up);
+  EXPECT_EQ(link(), InterfaceState::up);
 }
 
 TEST_F(Links, ASoundLinkIsLeftAlone) {
@@ -172,7 +172,7 @@ TEST_F(Links, BusOffIsCycledAtOnce) {
   go_bus_off();
   world_.run_for(200ms);
   EXPECT_EQ(asked_at_, Times{0});
-  EXPECT_EQ(link(), LinkState::up);
+  EXPECT_EQ(link(), InterfaceState::up);
   EXPECT_TRUE(machine_->find_bus("cell")->port().open);
 }
 
@@ -190,7 +190,7 @@ TEST_F(Links, AStallIsCycledAndNothingOfBeforeIsSent) {
   network_.set_stalled(false);
   world_.run_for(1s);
   EXPECT_TRUE(received.empty());
-  EXPECT_EQ(link(), LinkState::up);
+  EXPECT_EQ(link(), InterfaceState::up);
 }
 
 TEST_F(Links, WhoeverRefusesIsAskedAgainLessAndLess) {
@@ -200,7 +200,7 @@ TEST_F(Links, WhoeverRefusesIsAskedAgainLessAndLess) {
   EXPECT_EQ(asked_at_, (Times{0, 100, 300, 700, 1500, 3100, 6300, 12700, 22700}));
   helper_ = Helper::cycles;
   world_.run_for(10s);
-  EXPECT_EQ(link(), LinkState::up);
+  EXPECT_EQ(link(), InterfaceState::up);
 }
 
 TEST_F(Links, ALinkThatBreaksAgainAtOnceIsGivenTimeAndOneThatWasSoundIsNot) {
@@ -209,14 +209,14 @@ TEST_F(Links, ALinkThatBreaksAgainAtOnceIsGivenTimeAndOneThatWasSoundIsNot) {
     world_.run_for(10ms);
   }
   // The causes came 10 ms apart, and only the first was served at once.
-  EXPECT_EQ(link(), LinkState::bus_off);
+  EXPECT_EQ(link(), InterfaceState::bus_off);
   world_.run_for(1s);
-  EXPECT_EQ(link(), LinkState::up);
+  EXPECT_EQ(link(), InterfaceState::up);
   world_.run_for(LinkCycler::sound_after);
   go_bus_off();
   world_.run_for(50ms);
   EXPECT_EQ(asked_at_, Times{0});
-  EXPECT_EQ(link(), LinkState::up);
+  EXPECT_EQ(link(), InterfaceState::up);
 }
 
 TEST_F(Links, TheMachineClosesWhileAnAnswerIsOwed) {
@@ -314,7 +314,7 @@ TEST(LinkCycler, ASimulatedLinkNeedsNoHelper) {
   link->report(Controller::bus_off);
   EXPECT_EQ(bus.link().error->remedy.find("ip link"), std::string::npos);
   world.run_for(1ms);
-  EXPECT_EQ(bus.link().link, LinkState::up);
+  EXPECT_EQ(bus.link().link, InterfaceState::up);
   network.set_stalled(true);
   link->send(can::make_frame(0x123, {}), {}, {});
   world.run_for(99ms);
@@ -323,7 +323,7 @@ TEST(LinkCycler, ASimulatedLinkNeedsNoHelper) {
   EXPECT_EQ(link->counters().stalls, 1U);
   network.set_stalled(false);
   world.run_for(LinkCycler::longest_pause);
-  EXPECT_EQ(bus.link().link, LinkState::up);
+  EXPECT_EQ(bus.link().link, InterfaceState::up);
   EXPECT_FALSE(cycler.trouble());
   cycler.close();
   bus.close();

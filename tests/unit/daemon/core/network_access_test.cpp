@@ -291,7 +291,7 @@ TEST_F(NetworkAccess, TheStatusSaysWhatIsOnTheNetwork) {
   EXPECT_TRUE(status[0].simulated);
   ASSERT_TRUE(status[0].network);
   const auto& network = *status[0].network;
-  EXPECT_EQ(network.link, can::LinkState::up);
+  EXPECT_EQ(network.link, can::InterfaceState::up);
   EXPECT_THAT(network.foreign_nodes, ElementsAre(22));
   EXPECT_EQ(network.others.foreign_node, 2U);
   EXPECT_GE(network.sdo.timeouts, 1U);
@@ -300,13 +300,14 @@ TEST_F(NetworkAccess, TheStatusSaysWhatIsOnTheNetwork) {
   EXPECT_GT(network.frames.received, 0U);
   EXPECT_EQ(network.sync_period, 10ms);
   port_->report(can::Controller::bus_off);
-  EXPECT_EQ(machine_->bus_status()[0].network->link, can::LinkState::bus_off);
+  EXPECT_EQ(machine_->bus_status()[0].network->link, can::InterfaceState::bus_off);
   world_.run_for(50ms);
-  EXPECT_EQ(machine_->bus_status()[0].network->link, can::LinkState::up);  // a simulated one needs nobody
+  EXPECT_EQ(machine_->bus_status()[0].network->link,
+            can::InterfaceState::up);  // a simulated one needs nobody
   EXPECT_TRUE(machine_->bus_status()[0].open);
   port_->set_up(false);
   world_.run_for(50ms);
-  EXPECT_EQ(machine_->bus_status()[0].network->link, can::LinkState::down);
+  EXPECT_EQ(machine_->bus_status()[0].network->link, can::InterfaceState::down);
   EXPECT_FALSE(machine_->bus_status()[0].open);
   EXPECT_TRUE(machine_->bus_status()[0].error);
 }
