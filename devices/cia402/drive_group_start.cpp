@@ -171,7 +171,7 @@ Task<Result<TimePoint>> Cia402Drive::check_prepared(MotionBlock block, bool by_s
   if (!canary) co_return canary;
   const auto nmt = bus_->master().nmt().status(node_.id()).state;
   const bool listens = nmt == canopen::NmtState::operational || nmt == canopen::NmtState::unknown;
-  const bool ready = moving == 0 && *control == control_word(Command::enable_operation) &&
+  const bool ready = moving == 0 && *control == control_word(ControlCommand::enable_operation) &&
                      *mode == std::to_underlying(OperationMode::profile_position);
   if (ready && (!by_sync || (listens && start_pdo_.id())) && canary_.is(block)) co_return canary;
   co_return fail(
@@ -193,7 +193,7 @@ Task<Result<void>> Cia402Drive::confirm_started() {
 }
 
 canopen::Bytes Cia402Drive::neutral_bytes() const {
-  const auto bits = words_.state_bits().value_or(control_word(Command::enable_operation));
+  const auto bits = words_.state_bits().value_or(control_word(ControlCommand::enable_operation));
   return canopen::number_bytes(bits | control::halt, word_bytes);
 }
 

@@ -197,7 +197,7 @@ void Cia402Drive::note_move_began(TimePoint at) {
 Task<> Cia402Drive::acknowledge_set_point(SdoOptions options) {
   const auto taken = [](std::int64_t word) { return (word & status::mode_specific) != 0; };
   (void)co_await read_until(object::status_word, taken, acknowledge_limit, options);
-  (void)co_await write_control(control_word(Command::enable_operation), std::move(options));
+  (void)co_await write_control(control_word(ControlCommand::enable_operation), std::move(options));
 }
 
 /// In homing mode already, at rest. Compared and not just written: some drives save these.
@@ -287,7 +287,8 @@ Task<Result<void>> Cia402Drive::home_here(SdoOptions options) {
     return (word & status::mode_specific) != 0 && (word & status::target_reached) != 0;
   };
   const auto word = co_await read_until(object::status_word, attained, acknowledge_limit, options);
-  const auto ended = co_await write_control(control_word(Command::enable_operation), std::move(options));
+  const auto ended =
+      co_await write_control(control_word(ControlCommand::enable_operation), std::move(options));
   if (!word) co_return fail(word.error());
   if (!attained(*word))
     co_return fail(error_at(Reason::not_confirmed, object::status_word,

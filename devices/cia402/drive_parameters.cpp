@@ -101,7 +101,7 @@ Task<Result<void>> Cia402Drive::quieten() {
   const auto word = co_await read_object(object::control_word, parameters());
   if (!word) co_return fail(word.error());
   if ((*word & enabling) != enabling) co_return Result<void>{};
-  co_return co_await write_control(control_word(Command::disable_voltage), parameters());
+  co_return co_await write_control(control_word(ControlCommand::disable_voltage), parameters());
 }
 
 Task<Result<void>> Cia402Drive::save_parameters() {

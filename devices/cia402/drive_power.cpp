@@ -31,9 +31,9 @@ constexpr int turning_readings = 3;
 
 /// The control word that keeps a state and asks for nothing.
 std::uint16_t quiet_word(State state) {
-  if (state == State::operation_enabled) return control_word(Command::enable_operation);
-  return state == State::switched_on ? control_word(Command::switch_on)
-                                     : control_word(Command::disable_voltage);
+  if (state == State::operation_enabled) return control_word(ControlCommand::enable_operation);
+  return state == State::switched_on ? control_word(ControlCommand::switch_on)
+                                     : control_word(ControlCommand::disable_voltage);
 }
 
 constexpr std::int64_t number_of(OperationMode mode) { return std::to_underlying(mode); }
@@ -293,7 +293,7 @@ Task<> Cia402Drive::release_again(SdoOptions options) {
   constexpr int attempts = 4;
   options.guard.not_after = TimePoint::max();
   options.guard.fencing_token = MotionGuard::needs_no_lease;
-  const auto shutdown = static_cast<std::uint16_t>(control_word(Command::shutdown) | control::halt);
+  const auto shutdown = static_cast<std::uint16_t>(control_word(ControlCommand::shutdown) | control::halt);
   for (int attempt = 0; attempt < attempts; ++attempt) {
     if (co_await turns(options) || may_send(options.guard, clock_->now()) != Verdict::send) co_return;
     const auto written = co_await write_control(shutdown, options);
@@ -320,10 +320,11 @@ Task<Result<void>> Cia402Drive::disable(MotionGuard guard) {
   // 0Fh with a motion under way: that ends first, as far as it can.
   if ((words_.control().value_or(0) & control::halt) == 0) (void)co_await stop(StopKind::stop);
   // The halt stays until the next enable has found that nothing is behind it.
-  const auto shutdown = static_cast<std::uint16_t>(control_word(Command::shutdown) | control::halt);
+  const auto shutdown = static_cast<std::uint16_t>(control_word(ControlCommand::shutdown) | control::halt);
   if (const auto written = co_await write_control(shutdown, options); !written) co_return written;
   if (!co_await released(options)) {
-    const auto off = static_cast<std::uint16_t>(control_word(Command::disable_voltage) | control::halt);
+    const auto off =
+        static_cast<std::uint16_t>(control_word(ControlCommand::disable_voltage) | control::halt);
     if (const auto written = co_await write_control(off, options); !written) co_return written;
     if (!co_await released(options))
       co_return fail(error_at(Reason::not_confirmed, object::status_word,

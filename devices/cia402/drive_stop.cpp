@@ -172,7 +172,8 @@ Task<Result<void>> Cia402Drive::send_stop(bool quick) {
   // shown by a released drive, which its bits alone leave so.
   const bool shown = start_pdo_.work() == StartPdo::Work::proving;
   if (words_.state_bits() || !shown)
-    co_await follow_waiting(with_halt(words_.state_bits().value_or(control_word(Command::enable_operation))));
+    co_await follow_waiting(
+        with_halt(words_.state_bits().value_or(control_word(ControlCommand::enable_operation))));
   const bool known = words_.state_bits().has_value();
   if (known && !quick) co_await send_control_pdo(with_halt(*words_.state_bits()));
   if (!known || !quick) co_await zero_velocity(first);
@@ -199,10 +200,10 @@ Task<Result<void>> Cia402Drive::send_stop(bool quick) {
   // does the ramp under a quick stop.
   const bool stronger = quick && !words_.halt_is_quick();
   const bool unseen = words_.halt() != KnownWords::Halt::braking;
-  const bool operates = bits == control_word(Command::enable_operation);
+  const bool operates = bits == control_word(ControlCommand::enable_operation);
   const bool under_halt = operates && was_halted && (stronger || unseen);
   // 6.2.2: the motor is energised there, too, and a terminal may have started it. Bit 8 means nothing there.
-  const bool switched_on = bits == control_word(Command::switch_on);
+  const bool switched_on = bits == control_word(ControlCommand::switch_on);
   if ((under_halt || switched_on) && co_await turns(urgent)) {
     sent = co_await halt_again(bits, urgent);
     if (sent) was_halted = false;
@@ -257,7 +258,7 @@ Task<Result<void>> Cia402Drive::halt_again(std::uint16_t bits, SdoOptions option
   // In Switched On it is the change of the mode that ends a motion; and what is under way may be a homing.
   const bool of_neutral = neutral == OperationMode::homing
                               ? words_.mode().value_or(neutral) == neutral
-                              : bits == control_word(Command::switch_on) && words_.mode() == neutral;
+                              : bits == control_word(ControlCommand::switch_on) && words_.mode() == neutral;
   if (of_neutral)
     if (auto left = co_await choose_mode_soon(OperationMode::profile_position, options); !left)
       co_return left;

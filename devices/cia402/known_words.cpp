@@ -17,9 +17,10 @@ std::uint16_t bits_of(std::uint16_t word) { return static_cast<std::uint16_t>(wo
 /// The state in which a drive rests that follows this control word.
 State state_after(std::uint16_t word) {
   const auto bits = bits_of(word);
-  if (bits == control_word(Command::enable_operation)) return State::operation_enabled;
-  if (bits == control_word(Command::switch_on)) return State::switched_on;
-  return bits == control_word(Command::shutdown) ? State::ready_to_switch_on : State::switch_on_disabled;
+  if (bits == control_word(ControlCommand::enable_operation)) return State::operation_enabled;
+  if (bits == control_word(ControlCommand::switch_on)) return State::switched_on;
+  return bits == control_word(ControlCommand::shutdown) ? State::ready_to_switch_on
+                                                        : State::switch_on_disabled;
 }
 
 }  // namespace
@@ -44,9 +45,9 @@ void KnownWords::see_state(State shown, Moment asked) {
   if (control_ && state_after(*control_) != shown) control_.reset();
   // Whatever led there: with these bits it stays there.
   if (shown == State::operation_enabled)
-    bits_ = control_word(Command::enable_operation);
+    bits_ = control_word(ControlCommand::enable_operation);
   else if (shown == State::switched_on)
-    bits_ = control_word(Command::switch_on);
+    bits_ = control_word(ControlCommand::switch_on);
   else if (bits_ && state_after(*bits_) != shown)
     bits_.reset();
   prove(asked);

@@ -29,23 +29,23 @@ constexpr auto patterns = std::to_array<Pattern>({
 constexpr auto arrows = std::to_array<Transition>({
     {0, undefined, not_ready_to_switch_on, {}},
     {1, not_ready_to_switch_on, switch_on_disabled, {}},
-    {2, switch_on_disabled, ready_to_switch_on, Command::shutdown},
-    {3, ready_to_switch_on, switched_on, Command::switch_on},
-    {4, switched_on, operation_enabled, Command::enable_operation},
-    {5, operation_enabled, switched_on, Command::disable_operation},
-    {6, switched_on, ready_to_switch_on, Command::shutdown},
-    {7, ready_to_switch_on, switch_on_disabled, Command::disable_voltage},
-    {7, ready_to_switch_on, switch_on_disabled, Command::quick_stop},
-    {8, operation_enabled, ready_to_switch_on, Command::shutdown},
-    {9, operation_enabled, switch_on_disabled, Command::disable_voltage},
-    {10, switched_on, switch_on_disabled, Command::disable_voltage},
-    {10, switched_on, switch_on_disabled, Command::quick_stop},
-    {11, operation_enabled, quick_stop_active, Command::quick_stop},
-    {12, quick_stop_active, switch_on_disabled, Command::disable_voltage},
+    {2, switch_on_disabled, ready_to_switch_on, ControlCommand::shutdown},
+    {3, ready_to_switch_on, switched_on, ControlCommand::switch_on},
+    {4, switched_on, operation_enabled, ControlCommand::enable_operation},
+    {5, operation_enabled, switched_on, ControlCommand::disable_operation},
+    {6, switched_on, ready_to_switch_on, ControlCommand::shutdown},
+    {7, ready_to_switch_on, switch_on_disabled, ControlCommand::disable_voltage},
+    {7, ready_to_switch_on, switch_on_disabled, ControlCommand::quick_stop},
+    {8, operation_enabled, ready_to_switch_on, ControlCommand::shutdown},
+    {9, operation_enabled, switch_on_disabled, ControlCommand::disable_voltage},
+    {10, switched_on, switch_on_disabled, ControlCommand::disable_voltage},
+    {10, switched_on, switch_on_disabled, ControlCommand::quick_stop},
+    {11, operation_enabled, quick_stop_active, ControlCommand::quick_stop},
+    {12, quick_stop_active, switch_on_disabled, ControlCommand::disable_voltage},
     {13, undefined, fault_reaction_active, {}},
     {14, fault_reaction_active, fault, {}},
-    {15, fault, switch_on_disabled, Command::fault_reset},
-    {16, quick_stop_active, operation_enabled, Command::enable_operation},
+    {15, fault, switch_on_disabled, ControlCommand::fault_reset},
+    {16, quick_stop_active, operation_enabled, ControlCommand::enable_operation},
 });
 
 std::optional<Transition> by_number(int number) {
@@ -72,20 +72,20 @@ bool is_energised(State state) {
          state == fault_reaction_active;
 }
 
-std::uint16_t control_word(Command command) {
+std::uint16_t control_word(ControlCommand command) {
   switch (command) {
-    case Command::shutdown:
+    case ControlCommand::shutdown:
       return 0x0006;
-    case Command::switch_on:
-    case Command::disable_operation:
+    case ControlCommand::switch_on:
+    case ControlCommand::disable_operation:
       return 0x0007;
-    case Command::enable_operation:
+    case ControlCommand::enable_operation:
       return 0x000F;
-    case Command::quick_stop:
+    case ControlCommand::quick_stop:
       return 0x0002;
-    case Command::fault_reset:
+    case ControlCommand::fault_reset:
       return 0x0080;
-    case Command::disable_voltage:
+    case ControlCommand::disable_voltage:
       break;
   }
   return 0x0000;

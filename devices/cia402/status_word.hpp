@@ -28,7 +28,7 @@ State state_of(std::uint16_t status_word);
 bool is_energised(State state);
 
 /// What bits 0 to 3 and 7 of the control word (6040h) ask for.
-enum class Command : std::uint8_t {
+enum class ControlCommand : std::uint8_t {
   shutdown,
   switch_on,
   enable_operation,
@@ -38,14 +38,14 @@ enum class Command : std::uint8_t {
   fault_reset,  ///< by the rising edge of bit 7
 };
 /// The control word of a command, all other bits 0.
-std::uint16_t control_word(Command command);
+std::uint16_t control_word(ControlCommand command);
 
 /// One arrow of the state machine, numbered as in CiA 402.
 struct Transition {
   int number = 0;
   State from = State::undefined;  ///< undefined: power-up (0), or any state (13)
   State to = State::undefined;
-  std::optional<Command> command{};  ///< nothing: the drive does it by itself
+  std::optional<ControlCommand> command{};  ///< nothing: the drive does it by itself
 };
 /// All of them, in order; those that several commands cause once for each.
 std::span<const Transition> transitions();

@@ -71,21 +71,21 @@ TEST(StatusWord, OtherBitsDecideNothing) {
 }
 
 /// What CiA 402 makes of bits 0 to 3 and 7 of a control word (6.2.1, first table).
-bool fits(Command command, unsigned word) {
+bool fits(ControlCommand command, unsigned word) {
   const auto is = [word](unsigned mask, unsigned bits) { return (word & mask) == bits; };
   switch (command) {
-    case Command::shutdown:
+    case ControlCommand::shutdown:
       return is(0x87, 0x06);
-    case Command::switch_on:
-    case Command::disable_operation:
+    case ControlCommand::switch_on:
+    case ControlCommand::disable_operation:
       return is(0x8F, 0x07);
-    case Command::enable_operation:
+    case ControlCommand::enable_operation:
       return is(0x8F, 0x0F);
-    case Command::disable_voltage:
+    case ControlCommand::disable_voltage:
       return is(0x82, 0x00);
-    case Command::quick_stop:
+    case ControlCommand::quick_stop:
       return is(0x86, 0x02);
-    case Command::fault_reset:
+    case ControlCommand::fault_reset:
       return is(0x80, 0x80);
   }
   return false;
@@ -103,7 +103,7 @@ TEST(Transitions, AreNumberedAsInCiA402) {
   EXPECT_EQ(*numbers.rbegin(), 16);
   EXPECT_TRUE(std::ranges::is_sorted(transitions(), {}, &Transition::number));
   // One command never leads from one state to two.
-  std::set<std::pair<State, Command>> arrows;
+  std::set<std::pair<State, ControlCommand>> arrows;
   for (const auto& transition : transitions())
     if (transition.command) EXPECT_TRUE(arrows.emplace(transition.from, *transition.command).second);
 }
@@ -130,7 +130,7 @@ TEST(Transitions, LeadToAReleasedStageFromWhereverItIsOn) {
     ASSERT_TRUE(step);
     EXPECT_EQ(step->from, state);
     EXPECT_FALSE(is_energised(step->to));
-    EXPECT_NE(step->command, Command::quick_stop) << "M12";
+    EXPECT_NE(step->command, ControlCommand::quick_stop) << "M12";
   }
 }
 
