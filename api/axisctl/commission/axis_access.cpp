@@ -74,7 +74,7 @@ VelocityRange AxisAccess::velocities() {
 
 void AxisAccess::acquire_lease(const std::string& label) {
   if (lease_) return;
-  lease_ = std::make_unique<LeaseKeeper>(client(), axis_, label);
+  lease_ = std::make_unique<HeldLease>(client(), axis_, label);
   ours_ = true;
 }
 

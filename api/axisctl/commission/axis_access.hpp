@@ -7,7 +7,7 @@
 #include <optional>
 #include <string>
 
-#include "api/axisctl/commission/lease_keeper.hpp"
+#include "api/axisctl/commission/held_lease.hpp"
 #include "api/axisctl/commission/plan.hpp"
 #include "api/axisctl/invocation.hpp"
 #include "axisd/v1/budget.pb.h"
@@ -69,7 +69,7 @@ class AxisAccess {
 
   Invocation& invocation_;
   std::string axis_;
-  std::unique_ptr<LeaseKeeper> lease_;
+  std::unique_ptr<HeldLease> lease_;
   const std::string hold_id_ = random_uuid();  ///< of its stops with hold
   bool holds_ = false;                         ///< a stop with hold was asked for, and not released since
   std::atomic<bool> ours_ = false;

@@ -1,4 +1,4 @@
-#include "api/axisctl/commission/lease_keeper.hpp"
+#include "api/axisctl/commission/held_lease.hpp"
 
 #include <chrono>
 
@@ -17,7 +17,7 @@ constexpr int repeats = 10;  // per renewal
 
 }  // namespace
 
-LeaseKeeper::LeaseKeeper(const Client& client, const std::string& axis, const std::string& label)
+HeldLease::HeldLease(const Client& client, const std::string& axis, const std::string& label)
     : client_(client) {
   v1::AcquireLeaseRequest request;
   request.add_axes(axis);
@@ -31,7 +31,7 @@ LeaseKeeper::LeaseKeeper(const Client& client, const std::string& axis, const st
   thread_ = std::thread([this] { renew_until_closed(); });
 }
 
-LeaseKeeper::~LeaseKeeper() {
+HeldLease::~HeldLease() {
   {
     const std::lock_guard lock(mutex_);
     closing_ = true;
@@ -47,12 +47,12 @@ LeaseKeeper::~LeaseKeeper() {
   }
 }
 
-std::string LeaseKeeper::lost() const {
+std::string HeldLease::lost() const {
   const std::lock_guard lock(mutex_);
   return lost_;
 }
 
-void LeaseKeeper::renew_until_closed() {
+void HeldLease::renew_until_closed() {
   v1::RenewLeaseRequest request;
   request.set_lease_token(token_);
   std::unique_lock lock(mutex_);

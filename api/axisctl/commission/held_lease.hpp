@@ -13,14 +13,14 @@ namespace axisd::axisctl::commission {
 
 /// Acquires the lease of one axis and renews it on a thread of its own. If this program hangs or dies, the
 /// lease ends by itself and the axis does what `on_lease_loss` says. Thread: any.
-class LeaseKeeper {
+class HeldLease {
  public:
   /// Throws Failure if the axis cannot be had.
-  LeaseKeeper(const Client& client, const std::string& axis, const std::string& label);
-  LeaseKeeper(const LeaseKeeper&) = delete;
-  LeaseKeeper& operator=(const LeaseKeeper&) = delete;
+  HeldLease(const Client& client, const std::string& axis, const std::string& label);
+  HeldLease(const HeldLease&) = delete;
+  HeldLease& operator=(const HeldLease&) = delete;
   /// Releases it.
-  ~LeaseKeeper();
+  ~HeldLease();
 
   [[nodiscard]] std::uint64_t token() const { return token_; }
   /// Why it is over; empty: it is not, as far as is known.
