@@ -5,7 +5,7 @@
 #include <string>
 #include <string_view>
 
-#include "devices/axis/settings.hpp"
+#include "devices/drive_settings.hpp"
 #include "devices/descriptor.hpp"
 
 namespace axisd {

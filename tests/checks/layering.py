@@ -2,7 +2,8 @@
 
 The folders stand on each other: buses < devices < config, api < daemon. Third-party libraries are confined to the
 folder that wraps them. Time is asked for and waited for in one place. A drive family's simulator shares nothing with
-its driver but the register table, so that one's mistake is not the other's.
+its driver but the register table, so that one's mistake is not the other's. Drives and their contract know nothing of
+the axis.
 """
 
 import re
@@ -67,6 +68,9 @@ TIME_ALLOWED = re.compile(r"buses/(asio_)?clock\.[ch]pp$")
 INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*(["<])([^">]+)[">]', re.MULTILINE)
 COMMENT_OR_STRING = re.compile(r'//[^\n]*|/\*.*?\*/|"(?:\\.|[^"\\\n])*"', re.DOTALL)
 LAYERS = ("buses", "devices", "config", "api", "daemon")
+# What a drive is, without the axis that uses it: with the folders of the models these may include nothing of devices/axis.
+DRIVE_CONTRACT = {f"devices/{name}.hpp" for name in ("drive", "drive_facets", "drive_settings", "drive_values", "descriptor", "canary",
+                                                     "rtu_identification", "can_identification", "setup_codes", "released_position")}
 SHARED_BY_FAMILY = re.compile(r"(registers|parameters)[^/]*\.hpp$")
 
 
@@ -100,6 +104,9 @@ def family_finding(path, included, family_folders, mixed_folders):
     target = included.rsplit("/", 1)[0]
     if target in family_folders and target != own:
         return "a drive family is reached through its descriptor only"
+    if included.startswith("devices/axis/") and (
+            path.as_posix() in DRIVE_CONTRACT or path.parent.as_posix() in family_folders | mixed_folders):
+        return "a drive knows nothing of the axis that uses it"
     simulates = path.name.startswith("simulat")
     if path.parts[0] == "devices" and own != "devices/simulation" and included.startswith("devices/simulation/"):
         if not simulates and path.parts[1] != "simulation":

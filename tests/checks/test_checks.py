@@ -51,6 +51,8 @@ BAD_INCLUDES = {  # path -> (text, what the finding says)
     "devices/m1/simulator_f.cpp": ('#include "devices/m1/drive.hpp"', "share the register table only"),
     "devices/m1/simulator_g.cpp": ('#include "devices/m1/codec.hpp"', "share the register table only"),
     "devices/m1/h.cpp": ('#include "devices/simulation/pty_line.hpp"', "only simulators"),
+    "devices/drive.hpp": ('#include "devices/axis/settings.hpp"', "knows nothing of the axis"),
+    "devices/m1/i.cpp": ('#include "devices/axis/axis.hpp"', "knows nothing of the axis"),
     "config/a.cpp": ('#include "api/server/server.hpp"', "may include only"),
     "config/b.cpp": ("#include <grpcpp/grpcpp.h>", "grpcpp belongs to"),
     "config/c.cpp": ('#include <axisd/v1/types.pb.h>', "may include only"),
