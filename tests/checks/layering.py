@@ -49,6 +49,7 @@ THIRD_PARTY = {
     "linux/can": ["buses/can"],
     "boost/asio": ["buses", "daemon", "api/exposition", "api/cell", "api/web/gateway"],
     "boost/beast": ["api/exposition", "api/web/gateway"],
+    "boost/json": ["api/server", "cmake", "config"],
     "yaml-cpp": ["config"],
     "grpc": ["api/program", "api/transport", "api/server", "api/cell", "api/axisctl", "api/web/gateway", "daemon/*"],
     "grpcpp": ["api/transport", "api/server", "api/cell", "api/axisctl", "api/examples", "api/web/gateway", "daemon/*"],

@@ -1,5 +1,5 @@
 // Asks an independent validator (python3-jsonschema) what it makes of the schema and the files.
-#include <gtest/gtest.h>
+#include <gmock/gmock.h>
 #include <unistd.h>
 
 #include <cstdlib>
@@ -20,6 +20,12 @@ TEST(JsonSchema, AgreesWithTheLoader) {
                        "' '" + source_path("").string() + "'";
   EXPECT_EQ(std::system(command.c_str()), 0) << command;
   std::filesystem::remove(path);
+}
+
+/// What a device of 32 bit can hold, with all digits.
+TEST(JsonSchema, BoundsAreExact) {
+  EXPECT_THAT(json_schema(), testing::HasSubstr(R"("minimum": -2147483648,)"));
+  EXPECT_THAT(json_schema(), testing::HasSubstr(R"("maximum": 4294967295,)"));
 }
 
 TEST(JsonSchema, IsTheSameEveryTime) { EXPECT_EQ(json_schema(), json_schema()); }
