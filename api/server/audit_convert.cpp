@@ -11,7 +11,7 @@
 
 #include "api/server/convert.hpp"
 #include "api/server/event_convert.hpp"
-#include "api/server/known_types.hpp"
+#include "api/server/json_text.hpp"
 
 namespace axisd::server {
 namespace {
@@ -159,12 +159,7 @@ void to_proto(const AuditEntry& from, v1::AuditRecord& to) {
 }
 
 std::string audit_line(const v1::AuditRecord& record) {
-  static KnownTypes types;
-  static const auto url = fmt::format("{}/{}", KnownTypes::prefix, record.GetDescriptor()->full_name());
-  std::string text;
-  json::JsonPrintOptions options;
-  options.preserve_proto_field_names = true;
-  if (json::BinaryToJsonString(&types, url, record.SerializeAsString(), &text, options).ok()) return text;
+  if (auto line = json_text(record)) return *std::move(line);
   // A time that no protobuf has, or a text that is no UTF-8: the number goes on, and it is seen that one is
   // missing.
   return fmt::format(R"({{"number":"{}","kind":"AUDIT_KIND_GAP","gap":{{"left_out":"1"}}}})",

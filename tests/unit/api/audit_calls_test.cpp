@@ -173,6 +173,16 @@ TEST(AuditLines, WhatWasSavedToAnEeprom) {
   EXPECT_EQ(record->event().eeprom_written().total(), 40U);
 }
 
+TEST(AuditLines, WhatHasNoTextKeepsItsNumber) {
+  auto nameless = command();
+  nameless.client = "\xFF";
+  const auto record = server::audit_record(line_of({.content = RefusedCommand{.command = nameless}}, 12));
+  ASSERT_TRUE(record);
+  EXPECT_EQ(record->number(), 12U);
+  EXPECT_EQ(record->kind(), v1::AUDIT_KIND_GAP);
+  EXPECT_EQ(record->gap().left_out(), 1U);
+}
+
 /// In memory.
 class FakeAudit final : public AuditAccess, public AuditSink {
  public:
