@@ -1,4 +1,4 @@
-#include "config/schema.hpp"
+#include "config/field.hpp"
 
 // `access:` who may do what.
 namespace axisd::config {
@@ -19,8 +19,17 @@ constexpr KeySpec axis_keys[] = {
      .choices = roles,
      .pattern = client_pattern,
      .pattern_hint = client_hint,
-     .apply = [](Target& t, const Value& v) { t.configuration->access->axes[t.access_axis] = v.roles; }},
+     .field = field([](auto& t) -> auto& { return t.configuration->access->axes[t.access_axis]; })},
 };
+
+std::vector<NamedTarget> axes(const Target& t) {
+  std::vector<NamedTarget> all;
+  for (const auto& axis : t.configuration->access->axes) {
+    all.push_back({axis.first, t});
+    all.back().target.access_axis = axis.first;
+  }
+  return all;
+}
 
 constexpr KeySpec keys[] = {
     {.key = "roles",
@@ -36,12 +45,12 @@ constexpr KeySpec keys[] = {
      .choices = roles,
      .pattern = client_pattern,
      .pattern_hint = client_hint,
-     .apply = [](Target& t, const Value& v) { t.configuration->access->roles = v.roles; }},
+     .field = field([](auto& t) -> auto& { return t.configuration->access->roles; })},
     {.key = "axes",
      .kind = Kind::named_sections,
      .description = "Roles on single axes, by the name of an axis or a group.",
      .children = axis_keys,
-     .apply = [](Target& t, const Value& v) { t.access_axis = v.text; }},
+     .field = {.apply = [](Target& t, const Value& v) { t.access_axis = v.text; }, .inside = &axes}},
     {.key = "delegates",
      .kind = Kind::roles,
      .description = "Clients that may speak for others, whom they name in the metadata axisd-user and "
@@ -51,7 +60,7 @@ constexpr KeySpec keys[] = {
      .choices = roles,
      .pattern = client_pattern,
      .pattern_hint = client_hint,
-     .apply = [](Target& t, const Value& v) { t.configuration->access->delegates = v.roles; }},
+     .field = field([](auto& t) -> auto& { return t.configuration->access->delegates; })},
 };
 
 }  // namespace

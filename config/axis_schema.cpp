@@ -1,6 +1,7 @@
 #include <algorithm>
+#include <iterator>
 
-#include "config/schema.hpp"
+#include "config/field.hpp"
 #include "devices/simulation/drive_option.hpp"
 
 // The keys of an axis. Ranges that depend on the model or on other keys are in axis_checks.cpp.
@@ -15,41 +16,35 @@ constexpr KeySpec scale_keys[] = {
      .description =
          "Pulses per motor revolution; one of the model's settings. It also limits the speed to 200 kHz.",
      .example = "5000 pulses/rev",
-     .apply = [](Target& t, const Value& v) { t.axis->axis.scale.pulses_per_revolution = v.integer; }},
+     .field = field([](auto& t) -> auto& { return t.axis->axis.scale.pulses_per_revolution; })},
     {.key = "gear",
      .kind = Kind::ratio,
      .description = "Motor revolutions / output revolutions.",
      .example = "10/1",
      .default_value = "1/1",
-     .apply =
-         [](Target& t, const Value& v) {
-           t.axis->axis.scale.gear_motor = v.numerator;
-           t.axis->axis.scale.gear_output = v.denominator;
-         }},
+     .field = pair_field([](auto& t) -> auto& { return t.axis->axis.scale.gear_motor; },
+                         [](auto& t) -> auto& { return t.axis->axis.scale.gear_output; })},
     {.key = "travel",
      .kind = Kind::travel,
      .description =
          "Travel per output revolution in the axis's unit. Default: 360 deg/rev for unit deg, 1 rev/rev for "
          "unit rev; else required.",
      .example = "5 mm/rev",
-     .apply =
-         [](Target& t, const Value& v) {
-           t.axis->axis.scale.travel_numerator = v.numerator;
-           t.axis->axis.scale.travel_denominator = v.denominator;
-         }},
+     .field = pair_field([](auto& t) -> auto& { return t.axis->axis.scale.travel_numerator; },
+                         [](auto& t) -> auto& { return t.axis->axis.scale.travel_denominator; })},
     {.key = "invert",
      .kind = Kind::boolean,
      .description = "Turns the axis: its positive direction is the drive's negative one.",
      .example = "true",
      .default_value = "false",
-     .apply = [](Target& t, const Value& v) { t.axis->axis.scale.invert = v.boolean; }},
+     .field = field([](auto& t) -> auto& { return t.axis->axis.scale.invert; })},
     {.key = "modulo",
      .kind = Kind::position,
      .above_minimum = true,
      .description = "Rotary axes: the position wraps at this value. Not together with limits.position.",
      .example = "180",
      .minimum = 0,
-     .apply = [](Target& t, const Value& v) { t.axis->axis.scale.modulo = v.number; }},
+     .field = field([](auto& t) -> auto& { return t.axis->axis.scale.modulo; })},
 };
 
 constexpr KeySpec limit_keys[] = {
@@ -57,35 +52,31 @@ constexpr KeySpec limit_keys[] = {
      .kind = Kind::position_range,
      .description = "Software limits [minimum, maximum]; checked before anything is sent.",
      .example = "[0, 400]",
-     .apply =
-         [](Target& t, const Value& v) {
-           t.axis->axis.limits.position_minimum = v.number;
-           t.axis->axis.limits.position_maximum = v.second;
-         }},
+     .field = pair_field([](auto& t) -> auto& { return t.axis->axis.limits.position_minimum; },
+                         [](auto& t) -> auto& { return t.axis->axis.limits.position_maximum; })},
     {.key = "velocity",
      .kind = Kind::velocity,
      .required = true,
      .description = "Highest velocity; also what a command without one uses.",
      .example = "50 mm/s",
-     .apply = [](Target& t, const Value& v) { t.axis->axis.limits.velocity = v.number; }},
+     .field = field([](auto& t) -> auto& { return t.axis->axis.limits.velocity; })},
     {.key = "acceleration_time",
      .kind = Kind::duration,
      .description = "From start speed to the commanded velocity; the drives take a time.",
      .example = "150 ms",
      .default_value = "100 ms",
-     .apply = [](Target& t, const Value& v) { t.axis->axis.limits.acceleration_time = v.duration; }},
+     .field = field([](auto& t) -> auto& { return t.axis->axis.limits.acceleration_time; })},
     {.key = "deceleration_time",
      .kind = Kind::duration,
      .description = "Also of stops. Default: acceleration_time.",
      .example = "120 ms",
-     .apply = [](Target& t, const Value& v) { t.axis->axis.limits.deceleration_time = v.duration; }},
+     .field = field([](auto& t) -> auto& { return t.axis->axis.limits.deceleration_time; })},
     {.key = "start_speed",
      .kind = Kind::motor_speed,
      .description = "Motor speed from which a ramp starts.",
      .example = "10 r/min",
      .default_value = "5 r/min",
-     .apply = [](Target& t,
-                 const Value& v) { t.axis->axis.limits.start_speed_rpm = static_cast<int>(v.integer); }},
+     .field = field([](auto& t) -> auto& { return t.axis->axis.limits.start_speed_rpm; })},
     {.key = "eeprom_saves_per_day",
      .kind = Kind::integer,
      .description =
@@ -96,10 +87,7 @@ constexpr KeySpec limit_keys[] = {
      .default_value = "100",
      .minimum = 1,
      .maximum = 10'000,
-     .apply =
-         [](Target& t, const Value& v) {
-           t.axis->axis.limits.eeprom_saves_per_day = static_cast<std::uint64_t>(v.integer);
-         }},
+     .field = field([](auto& t) -> auto& { return t.axis->axis.limits.eeprom_saves_per_day; })},
 };
 
 constexpr KeySpec poll_keys[] = {
@@ -110,7 +98,7 @@ constexpr KeySpec poll_keys[] = {
      .default_value = "20 ms",
      .minimum = 1,
      .maximum = 10'000,
-     .apply = [](Target& t, const Value& v) { t.axis->axis.poll_moving = v.duration; }},
+     .field = field([](auto& t) -> auto& { return t.axis->axis.poll_moving; })},
     {.key = "idle",
      .kind = Kind::duration,
      .description = "Refresh period at standstill.",
@@ -118,7 +106,7 @@ constexpr KeySpec poll_keys[] = {
      .default_value = "200 ms",
      .minimum = 1,
      .maximum = 10'000,
-     .apply = [](Target& t, const Value& v) { t.axis->axis.poll_idle = v.duration; }},
+     .field = field([](auto& t) -> auto& { return t.axis->axis.poll_idle; })},
 };
 
 constexpr KeySpec simulate_keys[] = {
@@ -128,7 +116,7 @@ constexpr KeySpec simulate_keys[] = {
          "Where the home switch becomes active, on an axis with modulo once per turn. Positions of simulate: "
          "count from the load's zero.",
      .example = "-20",
-     .apply = [](Target& t, const Value& v) { t.axis->simulation.home_switch = v.number; }},
+     .field = field([](auto& t) -> auto& { return t.axis->simulation.home_switch; })},
     {.key = "home_width",
      .kind = Kind::position,
      .above_minimum = true,
@@ -136,23 +124,23 @@ constexpr KeySpec simulate_keys[] = {
      .example = "2",
      .default_value = "1",
      .minimum = 0,
-     .apply = [](Target& t, const Value& v) { t.axis->simulation.home_width = v.number; }},
+     .field = field([](auto& t) -> auto& { return t.axis->simulation.home_width; })},
     {.key = "positive_limit",
      .kind = Kind::position,
      .description = "The positive limit is active from here on.",
      .example = "410",
-     .apply = [](Target& t, const Value& v) { t.axis->simulation.positive_limit = v.number; }},
+     .field = field([](auto& t) -> auto& { return t.axis->simulation.positive_limit; })},
     {.key = "negative_limit",
      .kind = Kind::position,
      .description = "The negative limit is active from here down.",
      .example = "-30",
-     .apply = [](Target& t, const Value& v) { t.axis->simulation.negative_limit = v.number; }},
+     .field = field([](auto& t) -> auto& { return t.axis->simulation.negative_limit; })},
     {.key = "start_position",
      .kind = Kind::position,
      .description = "Where the load stands at power-up.",
      .example = "50",
      .default_value = "0",
-     .apply = [](Target& t, const Value& v) { t.axis->simulation.start_position = v.number; }},
+     .field = field([](auto& t) -> auto& { return t.axis->simulation.start_position; })},
     {.key = "velocity_unit",
      .kind = Kind::choice,
      .description =
@@ -160,19 +148,19 @@ constexpr KeySpec simulate_keys[] = {
          "it: the drive that is simulated, whatever drive: says. Left out, as drive: says.",
      .example = "rpm",
      .choices = simulation::velocity_unit_names,
-     .apply = [](Target& t, const Value& v) { t.axis->simulation.velocity_unit = v.text; }},
+     .field = field([](auto& t) -> auto& { return t.axis->simulation.velocity_unit; })},
     {.key = "acceleration_unit",
      .kind = Kind::choice,
      .description = "Likewise of its ramps.",
      .example = "rpm_per_second",
      .choices = simulation::acceleration_unit_names,
-     .apply = [](Target& t, const Value& v) { t.axis->simulation.acceleration_unit = v.text; }},
+     .field = field([](auto& t) -> auto& { return t.axis->simulation.acceleration_unit; })},
     {.key = "enabled_at_power_up",
      .kind = Kind::boolean,
      .description = "The drive's power stage is on when it powers up, where the model has it so.",
      .example = "false",
      .default_value = "true",
-     .apply = [](Target& t, const Value& v) { t.axis->simulation.enabled_at_power_up = v.boolean; }},
+     .field = field([](auto& t) -> auto& { return t.axis->simulation.enabled_at_power_up; })},
 };
 
 constexpr KeySpec brake_keys[] = {
@@ -183,7 +171,7 @@ constexpr KeySpec brake_keys[] = {
      .default_value = "0 ms",
      .minimum = 0,
      .maximum = 10'000,
-     .apply = [](Target& t, const Value& v) { t.axis->axis.brake.release_time = v.duration; }},
+     .field = field([](auto& t) -> auto& { return t.axis->axis.brake.release_time; })},
     {.key = "engage_time",
      .kind = Kind::duration,
      .description = "Disable is not done before this time after the power stage is off.",
@@ -191,15 +179,27 @@ constexpr KeySpec brake_keys[] = {
      .default_value = "0 ms",
      .minimum = 0,
      .maximum = 10'000,
-     .apply = [](Target& t, const Value& v) { t.axis->axis.brake.engage_time = v.duration; }},
+     .field = field([](auto& t) -> auto& { return t.axis->axis.brake.engage_time; })},
 };
 
 constexpr std::string_view loads[] = {"normal", "vertical"};
 constexpr std::string_view escalations[] = {"none", "release"};
 constexpr std::string_view lease_losses[] = {"halt", "stop", "disable", "finish"};
 
-bool has(const std::vector<std::string>& items, std::string_view item) {
-  return std::ranges::find(items, item) != items.end();
+/// In the order of persist_parts.
+constexpr bool PersistSettings::* persist_members[] = {&PersistSettings::terminals,
+                                                       &PersistSettings::segments, &PersistSettings::homing,
+                                                       &PersistSettings::drive};
+
+void set_persist(Target& t, const Value& v) {
+  for (std::size_t i = 0; i < std::size(persist_parts); ++i)
+    t.axis->axis.persist.*persist_members[i] = std::ranges::find(v.items, persist_parts[i]) != v.items.end();
+}
+
+std::string show_persist(const Target& t) {
+  std::string text;
+  for (const auto member : persist_members) text += t.axis->axis.persist.*member ? "1" : "0";
+  return text;
 }
 
 const KeySpec axis_keys[] = {
@@ -210,7 +210,7 @@ const KeySpec axis_keys[] = {
      .example = "line-b",
      .pattern = name_pattern,
      .pattern_hint = "write the name of one of the buses",
-     .apply = [](Target& t, const Value& v) { t.axis->axis.bus = v.text; }},
+     .field = field([](auto& t) -> auto& { return t.axis->axis.bus; })},
     {.key = "node",
      .kind = Kind::integer,
      .required = true,
@@ -218,13 +218,13 @@ const KeySpec axis_keys[] = {
      .example = "7",
      .minimum = 1,
      .maximum = 127,
-     .apply = [](Target& t, const Value& v) { t.axis->axis.node = static_cast<std::uint8_t>(v.integer); }},
+     .field = field([](auto& t) -> auto& { return t.axis->axis.node; })},
     {.key = "model",
      .kind = Kind::model,
      .required = true,
      .description = "Drive model.",
      .example = "ykd2405pr",
-     .apply = [](Target& t, const Value& v) { t.axis->axis.model = v.text; }},
+     .field = field([](auto& t) -> auto& { return t.axis->axis.model; })},
     {.key = "unit",
      .kind = Kind::text,
      .required = true,
@@ -232,7 +232,7 @@ const KeySpec axis_keys[] = {
      .example = "mm",
      .pattern = "[A-Za-z]{1,16}",
      .pattern_hint = "use up to 16 letters, such as mm, deg or rev",
-     .apply = [](Target& t, const Value& v) { t.axis->axis.scale.unit = v.text; }},
+     .field = field([](auto& t) -> auto& { return t.axis->axis.scale.unit; })},
     {.key = "scale",
      .kind = Kind::section,
      .required = true,
@@ -247,7 +247,7 @@ const KeySpec axis_keys[] = {
      .kind = Kind::section,
      .description = "How the axis finds its zero; without it Home is refused.",
      .children = homing_schema(),
-     .apply = [](Target& t, const Value&) { t.axis->axis.homing.emplace(); }},
+     .field = optional_section([](auto& t) -> auto& { return t.axis->axis.homing; })},
     {.key = "inputs",
      .kind = Kind::terminals,
      .description = "Functions of input terminals, in axis direction."},
@@ -262,14 +262,14 @@ const KeySpec axis_keys[] = {
          "The drive's own table of motions, selected and started by terminals. Rows that are not given are "
          "cleared; without the section the drive's table is left alone.",
      .children = segment_schema(),
-     .apply = [](Target& t, const Value&) { t.axis->axis.segments.emplace(); }},
+     .field = optional_section([](auto& t) -> auto& { return t.axis->axis.segments; })},
     {.key = "load",
      .kind = Kind::choice,
      .description = "vertical: the power stage is never released by a policy.",
      .example = "vertical",
      .default_value = "normal",
      .choices = loads,
-     .apply = [](Target& t, const Value& v) { t.axis->axis.vertical = v.text == "vertical"; }},
+     .field = choice_field([](auto& t) -> auto& { return t.axis->axis.vertical; })},
     {.key = "on_lease_loss",
      .kind = Kind::choice,
      .description = "What the axis does when the lease that it is commanded under ends. finish: a move or "
@@ -278,30 +278,27 @@ const KeySpec axis_keys[] = {
      .example = "stop",
      .default_value = "halt",
      .choices = lease_losses,
-     .apply =
-         [](Target& t, const Value& v) {
-           t.axis->axis.on_lease_loss = static_cast<LeaseLoss>(choice_index(lease_losses, v.text));
-         }},
+     .field = choice_field([](auto& t) -> auto& { return t.axis->axis.on_lease_loss; })},
     {.key = "stop_escalation",
      .kind = Kind::choice,
      .description = "release: a quick stop that is not confirmed is followed by releasing the power stage.",
      .example = "release",
      .default_value = "none",
      .choices = escalations,
-     .apply = [](Target& t, const Value& v) { t.axis->axis.stop_escalation_release = v.text == "release"; }},
+     .field = choice_field([](auto& t) -> auto& { return t.axis->axis.stop_escalation_release; })},
     {.key = "require_trust",
      .kind = Kind::boolean,
      .description = "Absolute moves need a homed, set or restored position.",
      .example = "false",
      .default_value = "true",
-     .apply = [](Target& t, const Value& v) { t.axis->axis.require_trust = v.boolean; }},
+     .field = field([](auto& t) -> auto& { return t.axis->axis.require_trust; })},
     {.key = "jog_travel",
      .kind = Kind::position,
      .description = "Longest jog while the position is unknown.",
      .example = "20 mm",
      .default_value = "0",
      .minimum = 0,
-     .apply = [](Target& t, const Value& v) { t.axis->axis.jog_travel = v.number; }},
+     .field = field([](auto& t) -> auto& { return t.axis->axis.jog_travel; })},
     {.key = "position_tolerance",
      .kind = Kind::position,
      .description =
@@ -310,7 +307,7 @@ const KeySpec axis_keys[] = {
      .example = "0.01 mm",
      .default_value = "0",
      .minimum = 0,
-     .apply = [](Target& t, const Value& v) { t.axis->axis.position_tolerance = v.number; }},
+     .field = field([](auto& t) -> auto& { return t.axis->axis.position_tolerance; })},
     {.key = "turnaround_max",
      .kind = Kind::duration,
      .description = "RS-485: longest time that this drive takes before the first byte of its reply. Default: "
@@ -318,7 +315,7 @@ const KeySpec axis_keys[] = {
      .example = "8 ms",
      .minimum = 1,
      .maximum = 1000,
-     .apply = [](Target& t, const Value& v) { t.axis->axis.turnaround_max = v.duration; }},
+     .field = field([](auto& t) -> auto& { return t.axis->axis.turnaround_max; })},
     {.key = "poll",
      .kind = Kind::section,
      .description = "How often the drive's state is read.",
@@ -332,7 +329,7 @@ const KeySpec axis_keys[] = {
      .default_value = "100 ms",
      .minimum = 10,
      .maximum = 1000,
-     .apply = [](Target& t, const Value& v) { t.axis->axis.reboot_guard = v.duration; }},
+     .field = field([](auto& t) -> auto& { return t.axis->axis.reboot_guard; })},
     {.key = "start_within",
      .kind = Kind::duration,
      .description = "From the acceptance of a command to its first start frame, at most: what waits longer "
@@ -343,7 +340,7 @@ const KeySpec axis_keys[] = {
      .default_value = "2 s",
      .minimum = 50,
      .maximum = 60000,
-     .apply = [](Target& t, const Value& v) { t.axis->axis.start_within = v.duration; }},
+     .field = field([](auto& t) -> auto& { return t.axis->axis.start_within; })},
     {.key = "stop_margin",
      .kind = Kind::duration,
      .description = "How much longer than its deceleration time a stop may take before it is escalated.",
@@ -351,7 +348,7 @@ const KeySpec axis_keys[] = {
      .default_value = "300 ms",
      .minimum = 10,
      .maximum = 10'000,
-     .apply = [](Target& t, const Value& v) { t.axis->axis.stop_margin = v.duration; }},
+     .field = field([](auto& t) -> auto& { return t.axis->axis.stop_margin; })},
     {.key = "drift_check",
      .kind = Kind::duration,
      .description = "How often it is checked that the terminals still have their functions.",
@@ -359,7 +356,7 @@ const KeySpec axis_keys[] = {
      .default_value = "10 s",
      .minimum = 1000,
      .maximum = 3'600'000,
-     .apply = [](Target& t, const Value& v) { t.axis->axis.drift_check = v.duration; }},
+     .field = field([](auto& t) -> auto& { return t.axis->axis.drift_check; })},
     {.key = "persist",
      .kind = Kind::parts,
      .description =
@@ -368,13 +365,7 @@ const KeySpec axis_keys[] = {
      .example = "[terminals, segments]",
      .default_value = "false",
      .choices = persist_parts,
-     .apply =
-         [](Target& t, const Value& v) {
-           t.axis->axis.persist = {.terminals = has(v.items, "terminals"),
-                                   .segments = has(v.items, "segments"),
-                                   .homing = has(v.items, "homing"),
-                                   .drive = has(v.items, "drive")};
-         }},
+     .field = {.apply = &set_persist, .show = &show_persist}},
     {.key = "drive", .kind = Kind::model_settings, .description = "Settings that only this model has."},
     {.key = "simulate",
      .kind = Kind::section,

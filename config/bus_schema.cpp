@@ -1,4 +1,4 @@
-#include "config/schema.hpp"
+#include "config/field.hpp"
 
 // The keys of one bus: what it is to its drives, and what is asked of it.
 namespace axisd::config {
@@ -17,7 +17,7 @@ constexpr KeySpec budget_key{
     .example = "refuse",
     .default_value = "warn",
     .choices = budget_policies,
-    .apply = [](Target& t, const Value& v) { (t.*Bus)->budget.refuse = v.text == "refuse"; }};
+    .field = choice_field([](auto& t) -> auto& { return (t.*Bus)->budget.refuse; })};
 template <auto Bus>
 constexpr KeySpec stop_bound_key{
     .key = "stop_bound",
@@ -27,7 +27,7 @@ constexpr KeySpec stop_bound_key{
     .example = "400 ms",
     .minimum = 1,
     .maximum = 60'000,
-    .apply = [](Target& t, const Value& v) { (t.*Bus)->budget.stop_bound = v.duration; }};
+    .field = field([](auto& t) -> auto& { return (t.*Bus)->budget.stop_bound; })};
 template <auto Bus>
 constexpr KeySpec refresh_bound_key{
     .key = "refresh_bound",
@@ -36,7 +36,7 @@ constexpr KeySpec refresh_bound_key{
     .example = "3 s",
     .minimum = 1,
     .maximum = 60'000,
-    .apply = [](Target& t, const Value& v) { (t.*Bus)->budget.refresh_bound = v.duration; }};
+    .field = field([](auto& t) -> auto& { return (t.*Bus)->budget.refresh_bound; })};
 template <auto Bus>
 constexpr KeySpec host_allowance_key{
     .key = "host_allowance",
@@ -48,7 +48,7 @@ constexpr KeySpec host_allowance_key{
     .default_value = "5 ms",
     .minimum = 1,
     .maximum = 1000,
-    .apply = [](Target& t, const Value& v) { (t.*Bus)->budget.host_allowance = v.duration; }};
+    .field = field([](auto& t) -> auto& { return (t.*Bus)->budget.host_allowance; })};
 
 constexpr std::string_view formats[] = {"8N1", "8N2", "8E1", "8O1"};
 constexpr modbus_rtu::Format format_values[] = {{modbus_rtu::Parity::none, 1},
@@ -64,7 +64,7 @@ constexpr KeySpec modbus_rtu_keys[] = {
      .example = "/dev/serial/by-id/usb-FTDI_0002",
      .pattern = "sim|/.+",
      .pattern_hint = "write an absolute path such as /dev/ttyUSB0, or sim",
-     .apply = [](Target& t, const Value& v) { t.line->port = v.text; }},
+     .field = field([](auto& t) -> auto& { return t.line->port; })},
     {.key = "baud",
      .kind = Kind::integer,
      .description = "Bit rate, as set at the drives.",
@@ -72,15 +72,15 @@ constexpr KeySpec modbus_rtu_keys[] = {
      .default_value = "115200",
      .minimum = 1200,
      .maximum = 1'000'000,
-     .apply = [](Target& t, const Value& v) { t.line->baud = static_cast<int>(v.integer); }},
+     .field = field([](auto& t) -> auto& { return t.line->baud; })},
     {.key = "format",
      .kind = Kind::choice,
      .description = "Data bits, parity and stop bits, as set at the drives.",
      .example = "8E1",
      .default_value = "8N1",
      .choices = formats,
-     .apply = [](Target& t,
-                 const Value& v) { t.line->format = format_values[choice_index(formats, v.text)]; }},
+     .field = {.apply = [](Target& t, const Value& v) { t.line->format = format_values[v.integer]; },
+               .show = [](const Target& t) { return modbus_rtu::to_string(t.line->format); }}},
     {.key = "turnaround_max",
      .kind = Kind::duration,
      .description =
@@ -89,7 +89,7 @@ constexpr KeySpec modbus_rtu_keys[] = {
      .default_value = "20 ms",
      .minimum = 1,
      .maximum = 1000,
-     .apply = [](Target& t, const Value& v) { t.line->turnaround_max = v.duration; }},
+     .field = field([](auto& t) -> auto& { return t.line->turnaround_max; })},
     budget_key<&Target::line>,
     stop_bound_key<&Target::line>,
     refresh_bound_key<&Target::line>,
@@ -106,7 +106,7 @@ constexpr KeySpec canopen_keys[] = {
      .example = "can1",
      .pattern = "[A-Za-z][A-Za-z0-9_.-]{0,14}",
      .pattern_hint = "write the name of a network interface such as can0, or sim",
-     .apply = [](Target& t, const Value& v) { t.network->interface = v.text; }},
+     .field = field([](auto& t) -> auto& { return t.network->interface; })},
     {.key = "bitrate",
      .kind = Kind::integer,
      .description = "In bit/s, as set at the drives and at the interface; axisd does not change it.",
@@ -114,14 +114,14 @@ constexpr KeySpec canopen_keys[] = {
      .default_value = "1000000",
      .minimum = 10'000,
      .maximum = 1'000'000,
-     .apply = [](Target& t, const Value& v) { t.network->bitrate = static_cast<std::uint32_t>(v.integer); }},
+     .field = field([](auto& t) -> auto& { return t.network->bitrate; })},
     {.key = "sync_period",
      .kind = Kind::duration,
      .description = "How often axisd sends SYNC. Without it there is none, and drives report by events.",
      .example = "20 ms",
      .minimum = 1,
      .maximum = 1000,
-     .apply = [](Target& t, const Value& v) { t.network->sync_period = v.duration; }},
+     .field = field([](auto& t) -> auto& { return t.network->sync_period; })},
     {.key = "sdo_timeout",
      .kind = Kind::duration,
      .description = "Longest time that a node takes to answer an SDO request.",
@@ -129,7 +129,7 @@ constexpr KeySpec canopen_keys[] = {
      .default_value = "100 ms",
      .minimum = 5,
      .maximum = 5000,
-     .apply = [](Target& t, const Value& v) { t.network->sdo_timeout = v.duration; }},
+     .field = field([](auto& t) -> auto& { return t.network->sdo_timeout; })},
     {.key = "sdo_answer",
      .kind = Kind::duration,
      .description =
@@ -139,32 +139,38 @@ constexpr KeySpec canopen_keys[] = {
      .default_value = "5 ms",
      .minimum = 1,
      .maximum = 1000,
-     .apply = [](Target& t, const Value& v) { t.network->sdo_answer = v.duration; }},
+     .field = field([](auto& t) -> auto& { return t.network->sdo_answer; })},
     budget_key<&Target::network>,
     stop_bound_key<&Target::network>,
     refresh_bound_key<&Target::network>,
     host_allowance_key<&Target::network>,
 };
 
+/// The section of a bus that says its kind.
+template <auto Bus, class Get>
+consteval Field bus_of_kind(Get) {
+  return {.apply =
+              [](Target& t, const Value&) {
+                t.*Bus = &Get{}(t).emplace_back();
+                (t.*Bus)->name = t.bus_name;
+              },
+          .inside =
+              [](const Target& t) {
+                return t.*Bus != nullptr ? std::vector<NamedTarget>{{{}, t}} : std::vector<NamedTarget>{};
+              }};
+}
+
 constexpr KeySpec bus_keys[] = {
     {.key = "modbus_rtu",
      .kind = Kind::section,
      .description = "An RS-485 line.",
      .children = modbus_rtu_keys,
-     .apply =
-         [](Target& t, const Value&) {
-           t.line = &t.configuration->lines.emplace_back();
-           t.line->name = t.bus_name;
-         }},
+     .field = bus_of_kind<&Target::line>([](auto& t) -> auto& { return t.configuration->lines; })},
     {.key = "canopen",
      .kind = Kind::section,
      .description = "A CAN network.",
      .children = canopen_keys,
-     .apply =
-         [](Target& t, const Value&) {
-           t.network = &t.configuration->networks.emplace_back();
-           t.network->name = t.bus_name;
-         }},
+     .field = bus_of_kind<&Target::network>([](auto& t) -> auto& { return t.configuration->networks; })},
 };
 
 }  // namespace

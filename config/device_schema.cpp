@@ -1,5 +1,5 @@
+#include "config/field.hpp"
 #include "config/quantity.hpp"
-#include "config/schema.hpp"
 
 // The keys of nodes that are not axes. What depends on other keys is in device_checks.cpp.
 namespace axisd::config {
@@ -11,17 +11,14 @@ constexpr std::string_view object_types[] = {"u16", "i16", "u32", "i32", "f32", 
 constexpr std::span<const std::string_view> register_types = std::span(object_types).first(5);
 constexpr std::string_view accesses[] = {"ro", "rw"};
 
-void set_type(Target& t, const Value& v) {
-  t.device_value->type = static_cast<ValueType>(choice_index(object_types, v.text));
-}
-
 // What registers and objects have alike.
+constexpr Field type_field = choice_field([](auto& t) -> auto& { return t.device_value->type; });
 constexpr KeySpec scale_key{.key = "scale",
                             .kind = Kind::number,
                             .description = "Value = raw number x scale.",
                             .example = "0.1",
                             .default_value = "1",
-                            .apply = [](Target& t, const Value& v) { t.device_value->scale = v.number; }};
+                            .field = field([](auto& t) -> auto& { return t.device_value->scale; })};
 constexpr KeySpec unit_key{
     .key = "unit",
     .kind = Kind::text,
@@ -29,7 +26,7 @@ constexpr KeySpec unit_key{
     .example = "degC",
     .pattern = "[A-Za-z%][A-Za-z0-9%/*^._-]{0,15}",
     .pattern_hint = "use up to 16 letters, digits or any of % / * ^ . _ -, such as degC or l/min",
-    .apply = [](Target& t, const Value& v) { t.device_value->unit = v.text; }};
+    .field = field([](auto& t) -> auto& { return t.device_value->unit; })};
 constexpr KeySpec access_key{
     .key = "access",
     .kind = Kind::choice,
@@ -37,11 +34,16 @@ constexpr KeySpec access_key{
     .example = "rw",
     .default_value = "ro",
     .choices = accesses,
-    .apply = [](Target& t, const Value& v) { t.device_value->writable = v.text == "rw"; }};
+    .field = choice_field([](auto& t) -> auto& { return t.device_value->writable; })};
 
-void add_value(Target& t, const Value& v) {
-  t.device_value = &t.device->values.emplace_back();
-  t.device_value->name = v.text;
+constexpr Field values = list_of<&Target::device_value>([](auto& t) -> auto& { return t.device->values; },
+                                                        [](auto& value) -> auto& { return value.name; });
+/// Them, as the key for this kind of bus has them.
+template <BusKind kind>
+consteval Field values_of() {
+  return {.apply = values.apply, .inside = [](const Target& t) {
+            return t.device->kind == kind ? values.inside(t) : std::vector<NamedTarget>{};
+          }};
 }
 
 constexpr KeySpec register_keys[] = {
@@ -52,15 +54,14 @@ constexpr KeySpec register_keys[] = {
      .example = "0x0100",
      .minimum = 0,
      .maximum = 65535,
-     .apply = [](Target& t,
-                 const Value& v) { t.device_value->address = static_cast<std::uint16_t>(v.integer); }},
+     .field = field([](auto& t) -> auto& { return t.device_value->address; })},
     {.key = "type",
      .kind = Kind::choice,
      .description = "How the value lies in the registers; 32 bits take two, high word first.",
      .example = "i32",
      .default_value = "u16",
      .choices = register_types,
-     .apply = &set_type},
+     .field = type_field},
     scale_key,
     unit_key,
     access_key,
@@ -74,14 +75,16 @@ constexpr KeySpec object_keys[] = {
      .example = "6401h:01",
      .pattern = "[0-9A-Fa-f]{4}h:[0-9A-Fa-f]{2}",
      .pattern_hint = "write INDEXh:SUB, both hexadecimal, such as 6401h:01",
-     .apply = [](Target& t, const Value& v) { t.device_value->address = *parse_object_address(v.text); }},
+     .field = {
+         .apply = [](Target& t, const Value& v) { t.device_value->address = *parse_object_address(v.text); },
+         .show = [](const Target& t) { return to_text(t.device_value->address); }}},
     {.key = "type",
      .kind = Kind::choice,
      .required = true,
      .description = "Of the object; its size must be right, too.",
      .example = "i32",
      .choices = object_types,
-     .apply = &set_type},
+     .field = type_field},
     scale_key,
     unit_key,
     access_key,
@@ -95,7 +98,7 @@ constexpr KeySpec device_keys[] = {
      .example = "line-b",
      .pattern = name_pattern,
      .pattern_hint = "write the name of one of the buses",
-     .apply = [](Target& t, const Value& v) { t.device->bus = v.text; }},
+     .field = field([](auto& t) -> auto& { return t.device->bus; })},
     {.key = "node",
      .kind = Kind::integer,
      .required = true,
@@ -103,15 +106,14 @@ constexpr KeySpec device_keys[] = {
      .example = "21",
      .minimum = 1,
      .maximum = 247,  // Modbus over serial line 2.2
-     .apply = [](Target& t, const Value& v) { t.device->node = static_cast<std::uint8_t>(v.integer); }},
+     .field = field([](auto& t) -> auto& { return t.device->node; })},
     {.key = "model",
      .kind = Kind::choice,
      .required = true,
      .description = "modbus-generic: holding registers by name; canopen-generic: objects by name.",
      .example = "modbus-generic",
      .choices = models,
-     .apply = [](Target& t,
-                 const Value& v) { t.device->kind = static_cast<BusKind>(choice_index(models, v.text)); }},
+     .field = choice_field([](auto& t) -> auto& { return t.device->kind; })},
     {.key = "poll",
      .kind = Kind::duration,
      .description = "How often its values are read.",
@@ -119,7 +121,7 @@ constexpr KeySpec device_keys[] = {
      .default_value = "500 ms",
      .minimum = 10,
      .maximum = 3'600'000,
-     .apply = [](Target& t, const Value& v) { t.device->poll = v.duration; }},
+     .field = field([](auto& t) -> auto& { return t.device->poll; })},
     {.key = "turnaround_max",
      .kind = Kind::duration,
      .description = "RS-485: longest time that this device takes before the first byte of its reply. "
@@ -127,17 +129,17 @@ constexpr KeySpec device_keys[] = {
      .example = "60 ms",
      .minimum = 1,
      .maximum = 1000,
-     .apply = [](Target& t, const Value& v) { t.device->turnaround_max = v.duration; }},
+     .field = field([](auto& t) -> auto& { return t.device->turnaround_max; })},
     {.key = "registers",
      .kind = Kind::named_sections,
      .description = "Of modbus-generic: its registers, by name.",
      .children = register_keys,
-     .apply = &add_value},
+     .field = values_of<BusKind::modbus_rtu>()},
     {.key = "objects",
      .kind = Kind::named_sections,
      .description = "Of canopen-generic: its objects, by name.",
      .children = object_keys,
-     .apply = &add_value},
+     .field = values_of<BusKind::canopen>()},
 };
 
 }  // namespace

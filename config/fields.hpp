@@ -18,8 +18,9 @@ struct Section {
   std::map<std::string, std::string> fields{};
 };
 
-/// Everything that a configuration says, in the order of the file's sections.
-std::vector<Section> sections(const Configuration& configuration);
+/// Everything that a configuration says, in the order of the file's sections. A copy, because the schema
+/// leads to where values are stored.
+std::vector<Section> sections(Configuration configuration);
 
 /// What `after` says otherwise than `before`: nothing for two spellings of the same.
 std::vector<ConfigurationChange> differences(const Configuration& before, const Configuration& after);

@@ -1,4 +1,4 @@
-#include "config/schema.hpp"
+#include "config/field.hpp"
 
 // The keys of an axis's `homing`.
 namespace axisd::config {
@@ -17,43 +17,49 @@ constexpr KeySpec homing_keys[] = {
      .minimum = -128,
      .maximum = 127,
      .choices = methods,
-     .apply =
-         [](Target& t, const Value& v) {
-           if (v.text.empty())
-             t.axis->axis.homing->number = static_cast<std::int8_t>(v.integer);
-           else
-             t.axis->axis.homing->method = static_cast<HomingMethod>(choice_index(methods, v.text));
-         }},
+     .field = {.apply =
+                   [](Target& t, const Value& v) {
+                     if (v.text.empty())
+                       t.axis->axis.homing->number = static_cast<std::int8_t>(v.integer);
+                     else
+                       t.axis->axis.homing->method = static_cast<HomingMethod>(v.integer);
+                   },
+               .show =
+                   [](const Target& t) {
+                     const auto& homing = *t.axis->axis.homing;
+                     return homing.number ? fmt::format("number {}", int{*homing.number})
+                                          : to_text(homing.method);
+                   }}},
     {.key = "velocity",
      .kind = Kind::velocity,
      .required = true,
      .description = "Towards the switch.",
      .example = "20 mm/s",
-     .apply = [](Target& t, const Value& v) { t.axis->axis.homing->velocity = v.number; }},
+     .field = field([](auto& t) -> auto& { return t.axis->axis.homing->velocity; })},
     {.key = "search_velocity",
      .kind = Kind::velocity,
      .required = true,
      .description = "Slow, while looking for the edge of the switch.",
      .example = "2 mm/s",
-     .apply = [](Target& t, const Value& v) { t.axis->axis.homing->search_velocity = v.number; }},
+     .field = field([](auto& t) -> auto& { return t.axis->axis.homing->search_velocity; })},
     {.key = "acceleration_time",
      .kind = Kind::duration,
      .description = "While homing.",
      .example = "200 ms",
      .default_value = "100 ms",
-     .apply = [](Target& t, const Value& v) { t.axis->axis.homing->acceleration_time = v.duration; }},
+     .field = field([](auto& t) -> auto& { return t.axis->axis.homing->acceleration_time; })},
     {.key = "position",
      .kind = Kind::position,
      .description = "Position of the axis once it is homed.",
      .example = "12.5 mm",
      .default_value = "0",
-     .apply = [](Target& t, const Value& v) { t.axis->axis.homing->position = v.number; }},
+     .field = field([](auto& t) -> auto& { return t.axis->axis.homing->position; })},
     {.key = "offset",
      .kind = Kind::position,
      .description = "Signed way that the drive goes on from the switch before it is homed.",
      .example = "-3 mm",
      .default_value = "0",
-     .apply = [](Target& t, const Value& v) { t.axis->axis.homing->offset = v.number; }},
+     .field = field([](auto& t) -> auto& { return t.axis->axis.homing->offset; })},
     {.key = "backoff",
      .kind = Kind::position,
      .above_minimum = true,
@@ -61,14 +67,14 @@ constexpr KeySpec homing_keys[] = {
          "How far to move away from a switch that is already active; without it homing is refused there.",
      .example = "10 mm",
      .minimum = 0,
-     .apply = [](Target& t, const Value& v) { t.axis->axis.homing->backoff = v.number; }},
+     .field = field([](auto& t) -> auto& { return t.axis->axis.homing->backoff; })},
     {.key = "max_travel",
      .kind = Kind::position,
      .above_minimum = true,
      .description = "Homing is stopped after this way.",
      .example = "450 mm",
      .minimum = 0,
-     .apply = [](Target& t, const Value& v) { t.axis->axis.homing->max_travel = v.number; }},
+     .field = field([](auto& t) -> auto& { return t.axis->axis.homing->max_travel; })},
     {.key = "timeout",
      .kind = Kind::duration,
      .description = "Homing is stopped after this time.",
@@ -76,7 +82,7 @@ constexpr KeySpec homing_keys[] = {
      .default_value = "60 s",
      .minimum = 100,
      .maximum = 3'600'000,
-     .apply = [](Target& t, const Value& v) { t.axis->axis.homing->timeout = v.duration; }},
+     .field = field([](auto& t) -> auto& { return t.axis->axis.homing->timeout; })},
 };
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "buses/canopen/object.hpp"
+#include "config/field.hpp"
 #include "config/quantity.hpp"
 #include "config/reader.hpp"
 #include "config/text.hpp"
@@ -28,14 +29,14 @@ constexpr KeySpec terminal_keys[] = {
      .example = "home",
      .pattern = "[a-z][a-z0-9_]*",
      .pattern_hint = "write the name of one of the model's functions",
-     .apply = [](Target& t, const Value& v) { t.terminal->function = v.text; }},
+     .field = field([](auto& t) -> auto& { return t.terminal->function; })},
     {.key = "active",
      .kind = Kind::choice,
      .description = "Level at which the terminal is active.",
      .example = "low",
      .default_value = "high",
      .choices = levels,
-     .apply = [](Target& t, const Value& v) { t.terminal->active_low = v.text == "low"; }},
+     .field = choice_field([](auto& t) -> auto& { return t.terminal->active_low; })},
 };
 
 constexpr std::string_view object_types[] = {"u8", "i8", "u16", "i16", "u32", "i32"};
@@ -53,39 +54,39 @@ constexpr KeySpec object_keys[] = {
      .description = "What the object holds.",
      .example = "i32",
      .choices = object_types,
-     .apply = [](Target& t, const Value& v) { set_of_object(t, "type", v.text); }},
+     .field = {.apply = [](Target& t, const Value& v) { set_of_object(t, "type", v.text); }}},
     {.key = "access",
      .kind = Kind::choice,
      .description = "Whether the object can be read and written; none: the drive does not have it.",
      .example = "ro",
      .choices = object_accesses,
-     .apply = [](Target& t, const Value& v) { set_of_object(t, "access", v.text); }},
+     .field = {.apply = [](Target& t, const Value& v) { set_of_object(t, "access", v.text); }}},
     {.key = "minimum",
      .kind = Kind::integer,
      .description = "Lowest value that the drive takes.",
      .example = "1",
      .minimum = lowest_value,
      .maximum = highest_value,
-     .apply = [](Target& t, const Value& v) { set_of_object(t, "minimum", v.integer); }},
+     .field = {.apply = [](Target& t, const Value& v) { set_of_object(t, "minimum", v.integer); }}},
     {.key = "maximum",
      .kind = Kind::integer,
      .description = "Highest value that the drive takes.",
      .example = "100000",
      .minimum = lowest_value,
      .maximum = highest_value,
-     .apply = [](Target& t, const Value& v) { set_of_object(t, "maximum", v.integer); }},
+     .field = {.apply = [](Target& t, const Value& v) { set_of_object(t, "maximum", v.integer); }}},
     {.key = "default",
      .kind = Kind::integer,
      .description = "What the object holds after a power-up; of 6502h and 1018h, always.",
      .example = "1000",
      .minimum = lowest_value,
      .maximum = highest_value,
-     .apply = [](Target& t, const Value& v) { set_of_object(t, "default", v.integer); }},
+     .field = {.apply = [](Target& t, const Value& v) { set_of_object(t, "default", v.integer); }}},
     {.key = "pdo",
      .kind = Kind::boolean,
      .description = "Whether a PDO can carry the object.",
      .example = "false",
-     .apply = [](Target& t, const Value& v) { set_of_object(t, "pdo", v.boolean); }},
+     .field = {.apply = [](Target& t, const Value& v) { set_of_object(t, "pdo", v.boolean); }}},
 };
 
 /// Then it is no typing error: this model lacks it.

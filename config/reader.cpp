@@ -160,7 +160,7 @@ void Reader::read_key(const KeySpec& spec, const Node& key, const Node& value, c
   switch (spec.kind) {
     case Kind::section:
       if (!check_is_section(value, spec.key, path)) return;
-      if (spec.apply != nullptr) spec.apply(target_, {});
+      if (spec.field.apply != nullptr) spec.field.apply(target_, {});
       read_section(value, key.mark, spec.children, path);
       return;
     case Kind::named_sections:
@@ -195,7 +195,7 @@ void Reader::read_value(const KeySpec& spec, const Node& value, const std::strin
     report(path, parsed.error().mark, parsed.error().message, parsed.error().suggestion);
     return;
   }
-  if (spec.apply != nullptr) spec.apply(target_, *parsed);
+  if (spec.field.apply != nullptr) spec.field.apply(target_, *parsed);
 }
 
 void Reader::check_one_of(const KeySpec& spec, const Node& key, const Node& section,
@@ -243,7 +243,7 @@ void Reader::read_sections(const KeySpec& spec, const Node& value, const std::st
     const auto name = read_section_key(spec, key, here);
     if (!name || !check_is_section(section, key.text, here)) continue;
     const auto outside = target_;
-    spec.apply(target_, *name);
+    spec.field.apply(target_, *name);
     if (target_.axis != nullptr && outside.axis == nullptr) check_unit(section, here);
     read_section(section, key.mark, spec.children, here);
     if (spec.one_of) check_one_of(spec, key, section, here);

@@ -1,6 +1,6 @@
-#include "config/schema.hpp"
-
 #include <algorithm>
+
+#include "config/field.hpp"
 
 // One entry per key: what it looks like and where its value goes. What depends on other keys is in
 // machine_checks.cpp.
@@ -19,7 +19,7 @@ constexpr KeySpec tls_keys[] = {
      .example = "/etc/axisd/server.crt",
      .pattern = path_pattern,
      .pattern_hint = path_hint,
-     .apply = [](Target& t, const Value& v) { t.configuration->server.tls->certificate = v.text; }},
+     .field = field([](auto& t) -> auto& { return t.configuration->server.tls->certificate; })},
     {.key = "key",
      .kind = Kind::text,
      .required = true,
@@ -27,7 +27,7 @@ constexpr KeySpec tls_keys[] = {
      .example = "/etc/axisd/server.key",
      .pattern = path_pattern,
      .pattern_hint = path_hint,
-     .apply = [](Target& t, const Value& v) { t.configuration->server.tls->key = v.text; }},
+     .field = field([](auto& t) -> auto& { return t.configuration->server.tls->key; })},
     {.key = "client_ca",
      .kind = Kind::text,
      .required = true,
@@ -35,7 +35,7 @@ constexpr KeySpec tls_keys[] = {
      .example = "/etc/axisd/clients.crt",
      .pattern = path_pattern,
      .pattern_hint = path_hint,
-     .apply = [](Target& t, const Value& v) { t.configuration->server.tls->client_ca = v.text; }},
+     .field = field([](auto& t) -> auto& { return t.configuration->server.tls->client_ca; })},
     {.key = "crl",
      .kind = Kind::text,
      .description =
@@ -43,7 +43,7 @@ constexpr KeySpec tls_keys[] = {
      .example = "/etc/axisd/clients.crl",
      .pattern = path_pattern,
      .pattern_hint = path_hint,
-     .apply = [](Target& t, const Value& v) { t.configuration->server.tls->crl = v.text; }},
+     .field = field([](auto& t) -> auto& { return t.configuration->server.tls->crl; })},
 };
 
 constexpr KeySpec limit_keys[] = {
@@ -55,8 +55,7 @@ constexpr KeySpec limit_keys[] = {
      .default_value = "256",
      .minimum = 1,
      .maximum = 1000,
-     .apply = [](Target& t,
-                 const Value& v) { t.configuration->server.limits.calls = static_cast<int>(v.integer); }},
+     .field = field([](auto& t) -> auto& { return t.configuration->server.limits.calls; })},
     {.key = "streams",
      .kind = Kind::integer,
      .description = "Streams that one client may have open at a time.",
@@ -64,8 +63,7 @@ constexpr KeySpec limit_keys[] = {
      .default_value = "64",
      .minimum = 1,
      .maximum = 500,
-     .apply = [](Target& t,
-                 const Value& v) { t.configuration->server.limits.streams = static_cast<int>(v.integer); }},
+     .field = field([](auto& t) -> auto& { return t.configuration->server.limits.streams; })},
     {.key = "connections",
      .kind = Kind::integer,
      .description = "Connections of all clients together; those beyond are closed at once, or take the "
@@ -74,10 +72,7 @@ constexpr KeySpec limit_keys[] = {
      .default_value = "256",
      .minimum = 4,
      .maximum = 10'000,
-     .apply =
-         [](Target& t, const Value& v) {
-           t.configuration->server.limits.connections = static_cast<int>(v.integer);
-         }},
+     .field = field([](auto& t) -> auto& { return t.configuration->server.limits.connections; })},
     {.key = "request_ids",
      .kind = Kind::integer,
      .description =
@@ -87,10 +82,7 @@ constexpr KeySpec limit_keys[] = {
      .default_value = "1048576",
      .minimum = 1'000,
      .maximum = 10'000'000,
-     .apply =
-         [](Target& t, const Value& v) {
-           t.configuration->server.limits.request_ids = static_cast<int>(v.integer);
-         }},
+     .field = field([](auto& t) -> auto& { return t.configuration->server.limits.request_ids; })},
     {.key = "stalled_reader",
      .kind = Kind::duration,
      .description = "A stream whose reader has not read for so long is cancelled.",
@@ -98,7 +90,7 @@ constexpr KeySpec limit_keys[] = {
      .default_value = "2 s",
      .minimum = 100,
      .maximum = 60'000,
-     .apply = [](Target& t, const Value& v) { t.configuration->server.limits.stalled_reader = v.duration; }},
+     .field = field([](auto& t) -> auto& { return t.configuration->server.limits.stalled_reader; })},
 };
 
 constexpr KeySpec metrics_keys[] = {
@@ -110,7 +102,7 @@ constexpr KeySpec metrics_keys[] = {
      .example = "localhost:9000",
      .pattern = "(\\[[0-9A-Fa-f:.]+\\]|[A-Za-z0-9._-]+):[0-9]{1,5}",
      .pattern_hint = "write HOST:PORT or [IPV6]:PORT",
-     .apply = [](Target& t, const Value& v) { t.configuration->server.metrics.listen = v.text; }},
+     .field = field([](auto& t) -> auto& { return t.configuration->server.metrics.listen; })},
     {.key = "remote",
      .kind = Kind::boolean,
      .description =
@@ -118,7 +110,7 @@ constexpr KeySpec metrics_keys[] = {
          "state of all axes. Nothing can be commanded there.",
      .example = "true",
      .default_value = "false",
-     .apply = [](Target& t, const Value& v) { t.configuration->server.metrics.remote = v.boolean; }},
+     .field = field([](auto& t) -> auto& { return t.configuration->server.metrics.remote; })},
 };
 constexpr std::string_view plaintexts[] = {"loopback", "unix"};
 
@@ -132,7 +124,7 @@ constexpr KeySpec server_keys[] = {
      .default_value = "localhost:7443",
      .pattern = "unix:/.+|(\\[[0-9A-Fa-f:.]+\\]|[A-Za-z0-9._-]+):[0-9]{1,5}",
      .pattern_hint = "write HOST:PORT, [IPV6]:PORT or unix:/PATH",
-     .apply = [](Target& t, const Value& v) { t.configuration->server.listen = v.text; }},
+     .field = field([](auto& t) -> auto& { return t.configuration->server.listen; })},
     {.key = "stop_listen",
      .kind = Kind::text,
      .description =
@@ -141,12 +133,12 @@ constexpr KeySpec server_keys[] = {
      .example = "127.0.0.1:7500",
      .pattern = "unix:/.+|(\\[[0-9A-Fa-f:.]+\\]|[A-Za-z0-9._-]+):[0-9]{1,5}",
      .pattern_hint = "write HOST:PORT, [IPV6]:PORT or unix:/PATH",
-     .apply = [](Target& t, const Value& v) { t.configuration->server.stop_listen = v.text; }},
+     .field = field([](auto& t) -> auto& { return t.configuration->server.stop_listen; })},
     {.key = "tls",
      .kind = Kind::section,
      .description = "Mutual TLS; required where the daemon can be reached from other machines.",
      .children = tls_keys,
-     .apply = [](Target& t, const Value&) { t.configuration->server.tls.emplace(); }},
+     .field = optional_section([](auto& t) -> auto& { return t.configuration->server.tls; })},
     {.key = "plaintext",
      .kind = Kind::choice,
      .description =
@@ -155,11 +147,7 @@ constexpr KeySpec server_keys[] = {
      .example = "unix",
      .default_value = "loopback",
      .choices = plaintexts,
-     .apply =
-         [](Target& t, const Value& v) {
-           t.configuration->server.plaintext =
-               v.text == "unix" ? Plaintext::unix_sockets : Plaintext::loopback;
-         }},
+     .field = choice_field([](auto& t) -> auto& { return t.configuration->server.plaintext; })},
     {.key = "reflection",
      .kind = Kind::boolean,
      .description =
@@ -167,7 +155,7 @@ constexpr KeySpec server_keys[] = {
          "For development: clients know it from the .proto files.",
      .example = "true",
      .default_value = "false",
-     .apply = [](Target& t, const Value& v) { t.configuration->server.reflection = v.boolean; }},
+     .field = field([](auto& t) -> auto& { return t.configuration->server.reflection; })},
     {.key = "metrics",
      .kind = Kind::section,
      .description =
@@ -187,8 +175,7 @@ constexpr KeySpec flight_recorder_keys[] = {
      .default_value = "384",
      .minimum = 16,
      .maximum = 1024,
-     .apply = [](Target& t,
-                 const Value& v) { t.configuration->flight_recorder.memory = static_cast<int>(v.integer); }},
+     .field = field([](auto& t) -> auto& { return t.configuration->flight_recorder.memory; })},
     {.key = "files",
      .kind = Kind::integer,
      .description = "Flight records that are kept in the state directory; the oldest are removed.",
@@ -196,8 +183,7 @@ constexpr KeySpec flight_recorder_keys[] = {
      .default_value = "20",
      .minimum = 1,
      .maximum = 1000,
-     .apply = [](Target& t,
-                 const Value& v) { t.configuration->flight_recorder.files = static_cast<int>(v.integer); }},
+     .field = field([](auto& t) -> auto& { return t.configuration->flight_recorder.files; })},
 };
 
 constexpr KeySpec audit_keys[] = {
@@ -208,7 +194,7 @@ constexpr KeySpec audit_keys[] = {
      .default_value = "16",
      .minimum = 2,
      .maximum = 10000,
-     .apply = [](Target& t, const Value& v) { t.configuration->audit.files = static_cast<int>(v.integer); }},
+     .field = field([](auto& t) -> auto& { return t.configuration->audit.files; })},
     {.key = "file_size",
      .kind = Kind::integer,
      .description = "KiB that each of them comes to; a command takes about 1.5.",
@@ -216,8 +202,7 @@ constexpr KeySpec audit_keys[] = {
      .default_value = "8192",
      .minimum = 256,
      .maximum = 65536,
-     .apply = [](Target& t,
-                 const Value& v) { t.configuration->audit.file_size = static_cast<int>(v.integer); }},
+     .field = field([](auto& t) -> auto& { return t.configuration->audit.file_size; })},
 };
 
 constexpr std::string_view controls[] = {"open", "leased"};
@@ -230,7 +215,7 @@ constexpr KeySpec lease_keys[] = {
      .default_value = "100 ms",
      .minimum = 10,
      .maximum = 3'600'000,
-     .apply = [](Target& t, const Value& v) { t.configuration->leases.shortest_ttl = v.duration; }},
+     .field = field([](auto& t) -> auto& { return t.configuration->leases.shortest_ttl; })},
     {.key = "default_ttl",
      .kind = Kind::duration,
      .description = "Time to live where the client asks for none.",
@@ -238,7 +223,7 @@ constexpr KeySpec lease_keys[] = {
      .default_value = "2 s",
      .minimum = 10,
      .maximum = 3'600'000,
-     .apply = [](Target& t, const Value& v) { t.configuration->leases.default_ttl = v.duration; }},
+     .field = field([](auto& t) -> auto& { return t.configuration->leases.default_ttl; })},
     {.key = "longest_ttl",
      .kind = Kind::duration,
      .description = "Longest time to live: so long may a client that is gone keep its axes from others.",
@@ -246,7 +231,7 @@ constexpr KeySpec lease_keys[] = {
      .default_value = "60 s",
      .minimum = 10,
      .maximum = 3'600'000,
-     .apply = [](Target& t, const Value& v) { t.configuration->leases.longest_ttl = v.duration; }},
+     .field = field([](auto& t) -> auto& { return t.configuration->leases.longest_ttl; })},
 };
 
 constexpr KeySpec group_keys[] = {
@@ -256,7 +241,7 @@ constexpr KeySpec group_keys[] = {
      .description = "Its members, on any bus.",
      .example = "[lifter, pusher]",
      .pattern = name_pattern,
-     .apply = [](Target& t, const Value& v) { t.group->axes = v.items; }},
+     .field = field([](auto& t) -> auto& { return t.group->axes; })},
     {.key = "max_arrival_error",
      .kind = Kind::duration,
      .description =
@@ -264,18 +249,17 @@ constexpr KeySpec group_keys[] = {
      .example = "5 ms",
      .minimum = 1,
      .maximum = 60'000,
-     .apply = [](Target& t, const Value& v) { t.group->max_arrival_error = v.duration; }},
+     .field = field([](auto& t) -> auto& { return t.group->max_arrival_error; })},
 };
 
-constexpr KeySpec machine_key = {
-    .key = "machine",
-    .kind = Kind::text,
-    .required = true,
-    .description = "Name of this machine.",
-    .example = "press-2",
-    .pattern = name_pattern,
-    .pattern_hint = "a letter, then letters, digits, - or _; lower case",
-    .apply = [](Target& t, const Value& v) { t.configuration->machine = v.text; }};
+constexpr KeySpec machine_key = {.key = "machine",
+                                 .kind = Kind::text,
+                                 .required = true,
+                                 .description = "Name of this machine.",
+                                 .example = "press-2",
+                                 .pattern = name_pattern,
+                                 .pattern_hint = "a letter, then letters, digits, - or _; lower case",
+                                 .field = field([](auto& t) -> auto& { return t.configuration->machine; })};
 
 constexpr KeySpec state_directory_key = {
     .key = "state_directory",
@@ -285,7 +269,7 @@ constexpr KeySpec state_directory_key = {
     .default_value = "/var/lib/axisd",
     .pattern = path_pattern,
     .pattern_hint = path_hint,
-    .apply = [](Target& t, const Value& v) { t.configuration->state_directory = v.text; }};
+    .field = field([](auto& t) -> auto& { return t.configuration->state_directory; })};
 
 constexpr KeySpec control_key = {
     .key = "control",
@@ -295,16 +279,25 @@ constexpr KeySpec control_key = {
     .example = "leased",
     .default_value = "open",
     .choices = controls,
-    .apply = [](Target& t, const Value& v) { t.configuration->leases.required = v.text == "leased"; }};
+    .field = choice_field([](auto& t) -> auto& { return t.configuration->leases.required; })};
 
-constexpr KeySpec groups_key = {.key = "groups",
-                                .kind = Kind::named_sections,
-                                .description = "Axes that are moved and stopped together, by name.",
-                                .children = group_keys,
-                                .apply = [](Target& t, const Value& v) {
-                                  t.group = &t.configuration->groups.emplace_back();
-                                  t.group->name = v.text;
-                                }};
+constexpr KeySpec groups_key = {
+    .key = "groups",
+    .kind = Kind::named_sections,
+    .description = "Axes that are moved and stopped together, by name.",
+    .children = group_keys,
+    .field = list_of<&Target::group>([](auto& t) -> auto& { return t.configuration->groups; },
+                                     [](auto& group) -> auto& { return group.name; })};
+
+/// Of both kinds.
+std::vector<NamedTarget> buses(const Target& t) {
+  std::vector<NamedTarget> all;
+  for (auto& line : t.configuration->lines)
+    all.push_back({line.name, {.configuration = t.configuration, .line = &line}});
+  for (auto& network : t.configuration->networks)
+    all.push_back({network.name, {.configuration = t.configuration, .network = &network}});
+  return all;
+}
 
 }  // namespace
 
@@ -322,7 +315,7 @@ std::span<const KeySpec> schema() {
                       "that it does not "
                       "name can stop and nothing else.",
        .children = access_schema(),
-       .apply = [](Target& t, const Value&) { t.configuration->access.emplace(); }},
+       .field = optional_section([](auto& t) -> auto& { return t.configuration->access; })},
       {.key = "flight_recorder",
        .kind = Kind::section,
        .description = "The newest frames of each bus, written to a file after a fault.",
@@ -342,26 +335,20 @@ std::span<const KeySpec> schema() {
        .one_of = true,
        .description = "The wires, by name, each of one kind.",
        .children = bus_schema(),
-       .apply = [](Target& t, const Value& v) { t.bus_name = v.text; }},
+       .field = {.apply = [](Target& t, const Value& v) { t.bus_name = v.text; }, .inside = &buses}},
       {.key = "axes",
        .kind = Kind::named_sections,
        .may_be_empty = true,  // a machine builder starts with the buses and scans them
        .description = "The axes, by name.",
        .children = axis_schema(),
-       .apply =
-           [](Target& t, const Value& v) {
-             t.axis = &t.configuration->axes.emplace_back();
-             t.axis->axis.name = v.text;
-           }},
+       .field = list_of<&Target::axis>([](auto& t) -> auto& { return t.configuration->axes; },
+                                       [](auto& entry) -> auto& { return entry.axis.name; })},
       {.key = "devices",
        .kind = Kind::named_sections,
        .description = "Nodes on the buses that are not axes, by name.",
        .children = device_schema(),
-       .apply =
-           [](Target& t, const Value& v) {
-             t.device = &t.configuration->devices.emplace_back();
-             t.device->name = v.text;
-           }},
+       .field = list_of<&Target::device>([](auto& t) -> auto& { return t.configuration->devices; },
+                                         [](auto& device) -> auto& { return device.name; })},
       groups_key,
   };
   return top_keys;

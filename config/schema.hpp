@@ -42,9 +42,9 @@ enum class Kind : std::uint8_t {
 
 /// A value as read, in the form that its kind has.
 struct Value {
-  std::string text = {};  ///< text, choice; name of a named section
-  std::int64_t integer =
-      0;  ///< integer, register_address, motor_speed (r/min), microstep; of a numbered section
+  std::string text = {};     ///< text, choice; name of a named section
+  std::int64_t integer = 0;  ///< integer, register_address, motor_speed (r/min), microstep; of a numbered
+                             ///< section; of a choice where it stands in its list
   bool boolean = false;
   std::vector<std::string> items = {};  ///< parts, names
   Roles roles = {};
@@ -71,6 +71,23 @@ struct Target {
   std::string object = {};  ///< of `drive: { objects: ... }`: its settings begin with this
 };
 
+/// Inside of one section.
+struct NamedTarget {
+  std::string name;  ///< or number; empty: it has none
+  Target target;
+};
+
+/// How a key is tied to its place in the configuration; config/field.hpp makes them.
+struct Field {
+  /// Stores a value; of a section: prepares it; of named and numbered ones: prepares each, by its `text` or
+  /// `integer`. nullptr: nothing to store.
+  void (*apply)(Target&, const Value&) = nullptr;
+  /// The value there as text: equal exactly for equal values, defaults included. Not of sections.
+  std::string (*show)(const Target&) = nullptr;
+  /// The sections that there are. nullptr: the one, always.
+  std::vector<NamedTarget> (*inside)(const Target&) = nullptr;
+};
+
 struct KeySpec {
   std::string_view key;
   Kind kind = Kind::text;
@@ -87,9 +104,7 @@ struct KeySpec {
   std::string_view pattern = {};       ///< of a text, names, roles: ECMAScript regular expression, whole text
   std::string_view pattern_hint = {};  ///< what to say when it does not match
   std::span<const KeySpec> children = {};
-  /// Stores a value; of a section: prepares it; of named and numbered ones: prepares each, by its `text` or
-  /// `integer`. nullptr: nothing to store.
-  void (*apply)(Target&, const Value&) = nullptr;
+  Field field = {};
 };
 
 /// The keys of the file's top level.

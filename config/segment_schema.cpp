@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <array>
 
-#include "config/schema.hpp"
+#include "config/field.hpp"
 #include "devices/descriptor.hpp"
 
 // The keys of an axis's segments. What depends on the model or on other keys is in segment_checks.cpp.
@@ -17,13 +17,13 @@ constexpr KeySpec position_keys[] = {
      .required = true,
      .description = "Distance in mode relative, position in mode absolute; axis direction.",
      .example = "20 mm",
-     .apply = [](Target& t, const Value& v) { t.position_segment->target = v.number; }},
+     .field = field([](auto& t) -> auto& { return t.position_segment->target; })},
     {.key = "velocity",
      .kind = Kind::velocity,
      .required = true,
      .description = "Of this segment.",
      .example = "50 mm/s",
-     .apply = [](Target& t, const Value& v) { t.position_segment->velocity = v.number; }},
+     .field = field([](auto& t) -> auto& { return t.position_segment->velocity; })},
     {.key = "acceleration_time",
      .kind = Kind::duration,
      .description = "Also of the deceleration; shared with the velocity segment of the same number, whose "
@@ -31,7 +31,7 @@ constexpr KeySpec position_keys[] = {
                     "this one is not given.",
      .example = "120 ms",
      .default_value = "100 ms",
-     .apply = [](Target& t, const Value& v) { t.position_segment->acceleration_time = v.duration; }},
+     .field = field([](auto& t) -> auto& { return t.position_segment->acceleration_time; })},
 };
 
 constexpr KeySpec velocity_keys[] = {
@@ -40,7 +40,7 @@ constexpr KeySpec velocity_keys[] = {
      .required = true,
      .description = "Of this segment; an input with function pv_direction selects the direction.",
      .example = "20 mm/s",
-     .apply = [](Target& t, const Value& v) { t.velocity_segment->velocity = v.number; }},
+     .field = field([](auto& t) -> auto& { return t.velocity_segment->velocity; })},
     {.key = "acceleration_time",
      .kind = Kind::duration,
      .description = "Also of the deceleration; shared with the position segment of the same number, whose "
@@ -48,7 +48,7 @@ constexpr KeySpec velocity_keys[] = {
                     "this one is not given.",
      .example = "120 ms",
      .default_value = "100 ms",
-     .apply = [](Target& t, const Value& v) { t.velocity_segment->acceleration_time = v.duration; }},
+     .field = field([](auto& t) -> auto& { return t.velocity_segment->acceleration_time; })},
 };
 
 /// As many as the longest table of all models has.
@@ -66,29 +66,25 @@ auto segment_keys(int last) {
        .example = "absolute",
        .default_value = "relative",
        .choices = modes,
-       .apply = [](Target& t, const Value& v) { t.axis->axis.segments->absolute = v.text == "absolute"; }},
+       .field = choice_field([](auto& t) -> auto& { return t.axis->axis.segments->absolute; })},
       {.key = "positions",
        .kind = Kind::numbered_sections,
        .description = "Moves, by the number that pin0..pin4 select; started by an input with pt_enable.",
        .minimum = 1,
        .maximum = last,
        .children = position_keys,
-       .apply =
-           [](Target& t, const Value& v) {
-             t.position_segment = &t.axis->axis.segments->positions.emplace_back();
-             t.position_segment->number = static_cast<int>(v.integer);
-           }},
+       .field = list_of<&Target::position_segment>(
+           [](auto& t) -> auto& { return t.axis->axis.segments->positions; },
+           [](auto& row) -> auto& { return row.number; })},
       {.key = "velocities",
        .kind = Kind::numbered_sections,
        .description = "Velocities, by the number that pin0..pin4 select; run by an input with pv_enable.",
        .minimum = 1,
        .maximum = last,
        .children = velocity_keys,
-       .apply =
-           [](Target& t, const Value& v) {
-             t.velocity_segment = &t.axis->axis.segments->velocities.emplace_back();
-             t.velocity_segment->number = static_cast<int>(v.integer);
-           }},
+       .field = list_of<&Target::velocity_segment>(
+           [](auto& t) -> auto& { return t.axis->axis.segments->velocities; },
+           [](auto& row) -> auto& { return row.number; })},
   });
 }
 

@@ -74,7 +74,9 @@ Parsed parse_integer(const KeySpec& spec, const Node& node) {
 }
 
 Parsed parse_choice(const KeySpec& spec, const Node& node) {
-  if (std::ranges::find(spec.choices, node.text) != spec.choices.end()) return Value{.text = node.text};
+  if (std::ranges::find(spec.choices, node.text) != spec.choices.end())
+    return Value{.text = node.text,
+                 .integer = static_cast<std::int64_t>(choice_index(spec.choices, node.text))};
   if (spec.maximum && node.plain && matches(node.text, "-?[0-9]+")) return parse_integer(spec, node);
   return wrong(node, fmt::format("'{}' cannot be {}", spec.key, quoted(node.text)),
                suggest(node.text, spec.choices));

@@ -163,7 +163,7 @@ TEST_F(Schema, IsDocumented) {
     const bool of_model = spec->kind == Kind::terminals || spec->kind == Kind::model_settings;
     EXPECT_EQ(spec->example.empty(), of_model) << path;
     const bool only_choice = spec->kind == Kind::choice && spec->choices.size() == 1;
-    EXPECT_EQ(spec->apply == nullptr, of_model || only_choice) << path;
+    EXPECT_EQ(spec->field.apply == nullptr, of_model || only_choice) << path;
     if (spec->kind == Kind::text) EXPECT_FALSE(spec->pattern.empty() || spec->pattern_hint.empty()) << path;
     if (spec->required) EXPECT_TRUE(spec->default_value.empty()) << path;
   }
