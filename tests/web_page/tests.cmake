@@ -16,7 +16,7 @@ add_test(NAME web_page.browser COMMAND ${AXISD_NODE} ${page_tests}/run.mjs ${CMA
 add_test(NAME web_page.pictures COMMAND ${AXISD_NODE} ${page_tests}/run.mjs ${CMAKE_BINARY_DIR}/web_page_pictures pictures)
 set(names types types_of_tests unit browser pictures)
 if(TARGET axisd-web)
-  foreach(name IN ITEMS real explain hidden windows)
+  foreach(name IN ITEMS real explain hidden windows scope)
     add_test(NAME web_page.${name} COMMAND ${AXISD_NODE} ${page_tests}/real.mjs ${CMAKE_BINARY_DIR}/web_page_${name} ${name})
     set_tests_properties(web_page.${name} PROPERTIES ENVIRONMENT
       "AXISD=$<TARGET_FILE:axisd>;AXISD_WEB=$<TARGET_FILE:axisd-web>;AXISCTL=$<TARGET_FILE:axisctl>;AXISD_SANITIZE=${AXISD_SANITIZE}")
@@ -28,6 +28,6 @@ set_tests_properties(web_page.stubs PROPERTIES FIXTURES_SETUP web_page_stubs TIM
 set_tests_properties(${names} PROPERTIES FIXTURES_REQUIRED web_page_stubs TIMEOUT 600 LABELS web)
 # They hold buttons and measure how soon an axis rests.
 set(browsers ${names})
-list(FILTER browsers INCLUDE REGEX "browser|real|explain|hidden|windows")
+list(FILTER browsers INCLUDE REGEX "browser|real|explain|hidden|windows|scope")
 set_tests_properties(${browsers} PROPERTIES RUN_SERIAL ON)
 set_tests_properties(web_page.pictures PROPERTIES LABELS "web;slow")
