@@ -23,9 +23,11 @@ async function visibility(page: Page, state: 'hidden' | 'visible'): Promise<void
   }, state);
 }
 
-test('first load: everything from here, in three requests and two chunks, and nothing from anywhere else', async () => {
+test('first load: everything from here while no other host can be reached, and nothing is asked of one', async () => {
   const opened = await open(browser);
   const { page, url } = opened;
+  const elsewhere = await (await opened.context.newPage()).goto('http://axisd.example/').catch((error: Error) => error.message);
+  assert.match(String(elsewhere), /ERR_NAME_NOT_RESOLVED/);
   const hosts = new Set<string>();
   page.on('request', (request) => hosts.add(new URL(request.url()).origin));
   await page.reload();
