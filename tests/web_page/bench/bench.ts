@@ -1,15 +1,21 @@
 // What the page costs a stop, how old its values are on a slow computer, and whether its memory stays what it was.
-//   node tests/bench/page_bench.mjs BUILD [stop|all|slow|heap [NUMBER]]      NUMBER: stops of each kind, of heap minutes
+//   node tests/bench/page_bench.mjs BUILD [stop|all|slow|pages|heap [NUMBER [TIMES]]]
+// NUMBER: stops of each kind, of heap minutes; TIMES: as fast goes the time of the page, before a machine that is made up
 import { createRequire } from 'node:module';
+import { once } from 'node:events';
+import { Worker } from 'node:worker_threads';
 import type { Browser, CDPSession, Page } from 'playwright-core';
 import { fromBinary } from '@bufbuild/protobuf';
 import { WatchAxesResponseSchema } from '@proto/axis_service_pb';
 import { CHROMIUM, manyAxes, sleep, Stack, until } from '../real/stack';
+import { hurry, type Haste } from './haste';
+import { costOfPages } from './pages';
 
 const { chromium } = createRequire(process.env['AXISD_WEB_MODULES']!)('playwright-core') as typeof import('playwright-core');
 
 const SCREENS = ['machine', 'axis/turntable', 'scope', 'groups', 'terminals', 'buses', 'events', 'people'];
-const [what = '', number = ''] = process.argv.slice(2);
+const HEAP_AXES = 16;
+const [what = '', number = '', times = ''] = process.argv.slice(2);
 const ROUNDS = Number(number || '30');
 
 interface Running { stack: Stack; browser: Browser }
@@ -136,22 +142,49 @@ async function slow(): Promise<void> {
   });
 }
 
+/** What the page keeps, minute by minute of its own time. `more`: what else is told. */
+async function keeps(page: Page, minutes: number, every: number, haste: number, more: () => Promise<string>): Promise<void> {
+  const cdp: CDPSession = await page.context().newCDPSession(page);
+  await cdp.send('Performance.enable');
+  for (let minute = 0; minute <= minutes; minute += every) {
+    await cdp.send('HeapProfiler.collectGarbage');
+    const { metrics } = await cdp.send('Performance.getMetrics');
+    const value = (name: string) => metrics.find((one) => one.name === name)!.value;
+    console.log(`${minute} min: heap ${(value('JSHeapUsedSize') / 1e6).toFixed(2)} MB, ${value('Nodes')} nodes, ${value('JSEventListeners')} listeners${await more()}`);
+    if (minute < minutes) await sleep((every * 60_000) / haste);
+  }
+}
+
 async function heap(minutes: number): Promise<void> {
-  await running(16, async (all) => {
-    const page = await open(all, 'machine');
-    const cdp: CDPSession = await page.context().newCDPSession(page);
-    await cdp.send('Performance.enable');
-    for (let minute = 0; minute <= minutes; ++minute) {
-      await cdp.send('HeapProfiler.collectGarbage');
-      const { metrics } = await cdp.send('Performance.getMetrics');
-      const value = (name: string) => metrics.find((one) => one.name === name)!.value;
-      console.log(`${minute} min: heap ${(value('JSHeapUsedSize') / 1e6).toFixed(2)} MB, ${value('Nodes')} nodes, ${value('JSEventListeners')} listeners`);
-      if (minute < minutes) await sleep(60_000);
-    }
-  });
+  await running(HEAP_AXES, async (all) => keeps(await open(all, 'machine'), minutes, 1, 1, async () => ''));
+}
+
+/** The same in less time: clock and timers of the page, and of a machine that is made up, go `haste` times as fast. */
+async function heapInHaste(minutes: number, haste: number): Promise<void> {
+  const pace: Haste = { times: haste, from: Date.now() };
+  const machine = new Worker(new URL('./hasty_machine.mjs', import.meta.url),
+                             { workerData: { page: process.env['AXISD_WEB_PAGE'], axes: HEAP_AXES, haste: pace } });
+  const [url] = await once(machine, 'message') as [string];
+  const batches = async () => {
+    machine.postMessage(null);
+    return (await once(machine, 'message') as [number])[0];
+  };
+  const browser = await chromium.launch({ executablePath: CHROMIUM, args: ['--no-sandbox', '--disable-gpu'] });
+  try {
+    const page = await (await browser.newContext({ viewport: { width: 1440, height: 900 } })).newPage();
+    await page.addInitScript(hurry, pace);
+    await page.goto(`${url}/machine?panel=0&lang=en`);
+    await until(async () => await page.locator('tr[data-axis]').count() === HEAP_AXES && await page.locator('.banner.alarm').count() === 0, 'it is live', 20_000);
+    const shown = () => page.locator('tr[data-axis="axis-7"] .position b').textContent();
+    await keeps(page, minutes, 10, haste, async () => `, ${await batches()} batches, axis-7 at ${await shown()}`);
+  } finally {
+    await browser.close();
+    await machine.terminate();
+  }
 }
 
 if (what === '' || what === 'stop') await stopOfEight();
 if (what === '' || what === 'all') await stopOfAll();
 if (what === '' || what === 'slow') await slow();
-if (what === 'heap') await heap(Number(number || '20'));
+if (what === '' || what === 'pages') await costOfPages();
+if (what === 'heap') await (times === '' ? heap(Number(number || '20')) : heapInHaste(Number(number), Number(times)));

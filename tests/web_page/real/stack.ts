@@ -161,8 +161,8 @@ export class Stack {
   private readonly programs = { axisd: needed('AXISD'), web: needed('AXISD_WEB'), axisctl: needed('AXISCTL'), page: needed('AXISD_WEB_PAGE'),
                                 demo: needed('AXISD_DEMO') };
 
-  /** `change`: of the demo's configuration. */
-  async start(change: (yaml: string) => string = (yaml) => yaml): Promise<void> {
+  /** `change`: of the demo's configuration; `web`: lines of the gateway's. */
+  async start(change: (yaml: string) => string = (yaml) => yaml, web = ''): Promise<void> {
     const port = await freePort();
     this.server = `127.0.0.1:${port}`;
     const demo = readFileSync(this.programs.demo, 'utf8')
@@ -173,7 +173,7 @@ export class Stack {
     writeFileSync(join(this.folder, 'users'), '', { mode: 0o600 });  // nobody: whoever is at this computer is let in
     const stop = /stop_listen: ([\d.]+:\d+)/.exec(demo)![1]!;
     writeFileSync(join(this.folder, 'web.yaml'),
-                  `listen: localhost:${this.port}\naxisd: { server: "${this.server}", stop_server: "${stop}" }\nfiles: ${this.programs.page}\nusers: ${join(this.folder, 'users')}\n`);
+                  `listen: localhost:${this.port}\naxisd: { server: "${this.server}", stop_server: "${stop}" }\nfiles: ${this.programs.page}\nusers: ${join(this.folder, 'users')}\n${web}`);
     this.startDaemon();
     await this.answers();
     await this.startGateway();
@@ -194,6 +194,10 @@ export class Stack {
     }
     throw new Error(`axisd-web is not ready: ${said} ${readFileSync(join(this.folder, 'web.log'), 'utf8')}`);
   }
+
+  /** Where it is, without a network between. */
+  get gatewayPort(): number { return this.port; }
+  get gatewayPid(): number { return this.gateway!.pid!; }
 
   /** What it has to be asked with (AXISD_SERVER). */
   get address(): string { return this.server; }
