@@ -8,6 +8,7 @@
 #include <expected>
 #include <map>
 #include <memory>
+#include <set>
 #include <system_error>
 #include <utility>
 #include <variant>
@@ -15,8 +16,10 @@
 #include "buses/canopen/eds.hpp"
 #include "buses/clock.hpp"
 #include "config/checks.hpp"
+#include "config/clients_text.hpp"
 #include "config/configuration.hpp"
 #include "config/document.hpp"
+#include "config/named_files.hpp"
 #include "config/reader.hpp"
 #include "config/text.hpp"
 #include "devices/descriptor.hpp"
@@ -73,10 +76,9 @@ void read_sheets(Configuration& configuration, Diagnostics& diagnostics) {
   }
 }
 
-}  // namespace
-
-LoadResult load_text(std::string_view text, const std::string& file_name, const TlsCheck& check_tls,
-                     Duration longest) try {
+/// `others`: the text is a client's, see load_clients_text().
+LoadResult load(std::string_view text, const std::string& file_name, const TlsCheck& check_tls,
+                Duration longest, const std::set<std::string>* others) try {
   Diagnostics diagnostics(file_name);
   const auto document = parse_document(text);
   if (!document) {
@@ -86,6 +88,7 @@ LoadResult load_text(std::string_view text, const std::string& file_name, const 
   Configuration configuration;
   Places places;
   Reader(configuration, diagnostics, places).read(**document);
+  if (others != nullptr) check_named_files(configuration, *others, diagnostics, places);
   // Each may name a file of its own that takes its time.
   const auto begun = monotonic_now();
   for (auto& entry : configuration.axes) {
@@ -106,6 +109,19 @@ LoadResult load_text(std::string_view text, const std::string& file_name, const 
   return {std::move(configuration), {}};
 } catch (const std::exception& error) {  // out of memory
   return {{}, {{file_name, 0, 0, fmt::format("cannot be loaded: {}", printable(error.what())), ""}}};
+}
+
+}  // namespace
+
+LoadResult load_text(std::string_view text, const std::string& file_name, const TlsCheck& check_tls,
+                     Duration longest) {
+  return load(text, file_name, check_tls, longest, nullptr);
+}
+
+LoadResult load_clients_text(std::string_view text, const std::string& file_name,
+                             const std::set<std::string>& others, const TlsCheck& check_tls,
+                             Duration longest) {
+  return load(text, file_name, check_tls, longest, &others);
 }
 
 LoadResult load_file(const std::string& path, const std::string& original, const TlsCheck& check_tls) try {

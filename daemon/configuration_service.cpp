@@ -11,6 +11,7 @@
 #include "buses/limited_log.hpp"
 #include "buses/regular_file.hpp"
 #include "config/budget.hpp"
+#include "config/clients_text.hpp"
 #include "config/document.hpp"
 #include "config/fields.hpp"
 #include "daemon/store/line_text.hpp"
@@ -80,6 +81,7 @@ std::string revision_of(std::string_view yaml) {
 ConfigurationService::ConfigurationService(Parts parts)
     : parts_(std::move(parts)),
       served_(served_from(parts_.path, parts_.yaml, parts_.since)),
+      named_(config::named_files(parts_.configuration)),
       looks_(most_looks) {
   thread_ = store::start_thread("axisd-config", [this] { run(); });
 }
@@ -101,6 +103,11 @@ std::shared_ptr<const ServedConfiguration> ConfigurationService::served() const 
   return served_;
 }
 
+std::set<std::string> ConfigurationService::named_files() const {
+  const std::lock_guard lock(mutex_);
+  return named_;
+}
+
 void ConfigurationService::file_revision(std::function<void(Result<std::string>)> callback) {
   const bool taken = looks_.post([this, callback] {
     const auto text = read_regular_file(parts_.path, config::largest_text);
@@ -111,7 +118,7 @@ void ConfigurationService::file_revision(std::function<void(Result<std::string>)
 
 void ConfigurationService::check(std::string yaml, std::function<void(Result<ConfigurationCheck>)> callback) {
   const bool taken = looks_.post([this, callback, yaml = std::move(yaml)] {
-    auto loaded = config::load_text(yaml, parts_.path, parts_.check_tls, longest_look);
+    auto loaded = config::load_clients_text(yaml, parts_.path, named_files(), parts_.check_tls, longest_look);
     callback(ConfigurationCheck{.findings = findings_of(std::move(loaded.diagnostics)),
                                 .warnings = loaded.configuration ? config::warnings(*loaded.configuration)
                                                                  : std::vector<std::string>(),
@@ -194,9 +201,11 @@ void ConfigurationService::adopt(config::Configuration configuration, const std:
   if (parts_.adopted) parts_.adopted(parts_.configuration);
   if (revision_of(yaml) == served()->revision) return;
   auto next = served_from(parts_.path, yaml, std::chrono::system_clock::now());
+  auto named = config::named_files(parts_.configuration);
   {
     const std::lock_guard lock(mutex_);
     served_ = std::move(next);
+    named_ = std::move(named);
   }
   keep_copy();
 }

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <functional>
 #include <mutex>
+#include <set>
 #include <string>
 #include <string_view>
 #include <thread>
@@ -62,11 +63,13 @@ class ConfigurationService final : public ConfigurationAccess {
   void run();
   ConfigurationReload serve(const Request& request);
   void adopt(config::Configuration configuration, const std::string& yaml);
+  [[nodiscard]] std::set<std::string> named_files() const;
 
   Parts parts_;  ///< `configuration` is of the reloading thread
   mutable std::mutex mutex_;
   std::condition_variable wake_;
   std::shared_ptr<const ServedConfiguration> served_;  // guarded by mutex_
+  std::set<std::string> named_;                        // files, by what is served; guarded by mutex_
   std::optional<Request> request_;                     // guarded by mutex_
   bool busy_ = false;                                  // guarded by mutex_
   bool closing_ = false;                               // guarded by mutex_

@@ -75,13 +75,16 @@ class StopLane(Scenario):
         machine = self.ready_spinner()
         pipe = machine.path("pipe.eds")
         os.mkfifo(pipe)
+        for device in ("ptmx", "zero"):
+            os.symlink(f"/dev/{device}", machine.path(device))
         self.turning(machine)
         served = machine.client.call(machine.client.system.GetConfig, system_pb.GetConfigRequest()).yaml
-        for path in (pipe, "/dev/ptmx", "/dev/zero"):
+        for path, why in ((pipe, "no regular file"), (machine.path("ptmx"), "no regular file"),
+                          (machine.path("zero"), "no regular file"), ("/dev/ptmx", "is not below"), ("/dev/zero", "is not below")):
             yaml = served.replace("model: ykd2405pr", f"model: cia402\n    drive: {{ eds: {path} }}")
             self.assertIn(path, yaml)
             answer = machine.client.call(machine.client.system.CheckConfig, system_pb.CheckConfigRequest(yaml=yaml))
-            self.assertTrue([found for found in answer.findings if "no regular file" in found.message], answer)
+            self.assertTrue([found for found in answer.findings if why in found.message], answer)
         machine.client.to_done("Stop", "spinner")
         self.stands(machine)
 
