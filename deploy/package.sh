@@ -62,8 +62,9 @@ case $full in
   *~*) sed -i "1s/($version)/($full)/; 0,/^ -- /s/^ -- .*/ -- $maintainer  $when/" debian/changelog ;;
 esac
 # Debian's own programs: another python3 on the PATH would not have their modules. debhelper hides the home directory, and
-# with it what ccache has.
-CCACHE_DIR=${CCACHE_DIR:-$(ccache --get-config cache_dir)} PATH=/usr/sbin:/usr/bin:/sbin:/bin \
+# with it what ccache has. By depend mode: else ccache takes what differs in its comments only for the same, and debug
+# information has the checksums of the sources.
+CCACHE_DEPEND=1 CCACHE_DIR=${CCACHE_DIR:-$(ccache --get-config cache_dir)} PATH=/usr/sbin:/usr/bin:/sbin:/bin \
   DEB_BUILD_OPTIONS="parallel=${JOBS:-$(nproc)} ${DEB_BUILD_OPTIONS:-}" LC_ALL=C.UTF-8 \
   dpkg-buildpackage --build=binary --no-sign --root-command=fakeroot >"$out/build.log" 2>&1 ||
   { tail -n 40 "$out/build.log" >&2; die "the build failed; all of it is in $out/build.log"; }
