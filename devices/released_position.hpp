@@ -5,8 +5,8 @@
 #include <string>
 #include <string_view>
 
-#include "devices/drive_settings.hpp"
 #include "devices/descriptor.hpp"
+#include "devices/setup_values.hpp"
 
 namespace axisd {
 

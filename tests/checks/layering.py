@@ -70,8 +70,9 @@ INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*(["<])([^">]+)[">]', re.MULTIL
 COMMENT_OR_STRING = re.compile(r'//[^\n]*|/\*.*?\*/|"(?:\\.|[^"\\\n])*"', re.DOTALL)
 LAYERS = ("buses", "devices", "config", "api", "daemon")
 # What a drive is, without the axis that uses it: with the folders of the models these may include nothing of devices/axis.
-DRIVE_CONTRACT = {f"devices/{name}.hpp" for name in ("drive", "drive_facets", "drive_settings", "drive_values", "descriptor", "canary",
-                                                     "rtu_identification", "can_identification", "setup_codes", "released_position")}
+DRIVE_CONTRACT = {f"devices/{name}.hpp" for name in ("drive", "drive_facets", "drive_values", "setup_values", "descriptor", "canary",
+                                                     "rtu_identification", "can_identification", "setup_codes", "released_position",
+                                                     "drive_settings", "drive_configuration")}
 SHARED_BY_FAMILY = re.compile(r"(registers|parameters)[^/]*\.hpp$")
 
 
