@@ -22,9 +22,17 @@ struct Apply {
   void operator()(const AcceptState& /*change*/) const { state.convictions.clear(); }
 };
 
+/// By its canary a restart of the drive is still found (M1).
+void distrust(AxisRecord& axis) {
+  if (axis.offset) axis.offset->trust = PositionTrust::unknown;
+}
+
 struct ApplyAfterFailure {
   StoredState& state;
-  void operator()(const SetOffset& change) const { state.axes[change.axis].offset.reset(); }
+  void operator()(const SetOffset& change) const {
+    Apply{state}(change);
+    distrust(state.axes[change.axis]);
+  }
   void operator()(const ForgetOffset& change) const { Apply{state}(change); }
   void operator()(const SetInhibit& change) const {
     if (change.inhibit.active) Apply{state}(change);
@@ -50,7 +58,7 @@ void apply_after_failure(StoredState& state, const Change& change) {
 }
 
 void distrust_offsets(StoredState& state) {
-  for (auto& [name, axis] : state.axes) axis.offset.reset();
+  for (auto& [name, axis] : state.axes) distrust(axis);
 }
 
 void latch_by_caution(StoredState& state, WallTime now) {

@@ -41,8 +41,8 @@ using Change =
 void apply(StoredState& state, const Change& change);
 
 /// What is left of a change that could not be saved: the disk may hold either version, so the next save must
-/// not grant more than both. Offsets are void, an inhibit is latched and never released, holds stand, counts
-/// stay counted, convictions stand.
+/// not grant more than both. No offset is trusted, an inhibit is latched and never released, holds stand,
+/// counts stay counted, convictions stand.
 void apply_after_failure(StoredState& state, const Change& change);
 
 /// An older state in place of the newest one: no offset is trusted.

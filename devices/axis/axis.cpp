@@ -16,7 +16,7 @@ Axis::Axis(AxisEnvironment environment, AxisSettings settings, const DriveDescri
                   drift_, work_, earlier_, saved_, publisher_),
       stopper_(context_, sequences_, shaft_, connection_, connection_.link(), reader_, readings_, execution_,
                saved_, publisher_),
-      saved_(context_, shaft_, power_.machine()),
+      saved_(context_, shaft_, power_.machine(), sequences_.life()),
       drift_(context_, sequences_, shaft_, connection_.link(), connection_, work_, reader_, readings_,
              execution_, stopper_, publisher_),
       publisher_(context_, shaft_, connection_.link(), connection_.identity(), power_.machine(),
@@ -54,12 +54,8 @@ void Axis::start(bool answered) {
 
 void Axis::close() {
   // With what a start that was not sent has left in the drive. What moves comes to rest elsewhere.
-  if (!sequences_.life().ends() && context_.env.persistence != nullptr &&
-      connection_.link().is_configured() && context_.drive->continuity_mark()) {
-    const auto trust = execution_.at_rest() ? shaft_.tracker().trust() : PositionTrust::unknown;
-    context_.env.persistence->save_offset(context_.settings.name,
-                                          saved_.offset_record(shaft_.tracker().offset(), trust), {});
-  }
+  if (!sequences_.life().ends())
+    saved_.keep_canary(execution_.at_rest() ? shaft_.tracker().trust() : PositionTrust::unknown);
   sequences_.life().close();
   connection_.link().close();
   execution_.supersede(context_.error(Reason::cancelled, "the daemon ends"));

@@ -64,11 +64,7 @@ void Axis::retire(bool position_holds) {
   if (!position_holds) saved_.void_saved_position();
   saved_.remember_position();
   // By this the axis that comes after it finds a restart of the drive, also where there is no position (M1).
-  const bool keeps_canary = context_.env.persistence != nullptr && connection_.link().is_configured() &&
-                            context_.drive->continuity_mark().has_value();
-  if (keeps_canary && shaft_.tracker().trust() == PositionTrust::unknown)
-    context_.env.persistence->save_offset(
-        context_.settings.name, saved_.offset_record(shaft_.tracker().offset(), PositionTrust::unknown), {});
+  if (shaft_.tracker().trust() == PositionTrust::unknown) saved_.keep_canary(PositionTrust::unknown);
   close();
   context_.env.bus->port_changed().notify_all();  // whoever waits for the port looks again
 }

@@ -214,8 +214,10 @@ Task<Result<void>> DriveConnection::prove_or_configure() {
     const bool counts_on =
         context_.drive->counts_on(*shaft_.sample()) && !context_.may_move_by_itself();
     if (!proof && !counts_on) power_.restarted();
+    if (restorable && !proof) void_saved_position();
     if (restorable && (!proof || restorable->trust == PositionTrust::unknown)) {
-      void_saved_position();
+      // What is left of it is the canary: it is kept until the drive is configured, and has another (M1).
+      own_canary();
       restorable.reset();
     }
     if (sequences_.life().ends()) co_return fail(context_.ending());
@@ -253,13 +255,20 @@ std::optional<OffsetRecord> DriveConnection::restorable_position() {
   if (!record) return std::nullopt;
   if (record->canary == restart_mark()) {  // kept until somebody enables it (M1)
     power_.restarted();
-    earlier_.run().tried();
+    own_canary();
     return std::nullopt;
   }
   // By the journal it has proven it already, and holds what was written for a motion since.
   const auto found_there = context_.drive->continuity_mark();
-  if (record->canary.empty() || (found_there && *found_there != record->canary)) {
+  if (record->canary.empty()) {
     void_saved_position();
+    return std::nullopt;
+  }
+  if (found_there && *found_there != record->canary) {
+    record->canary = *found_there;
+    record->trust = PositionTrust::unknown;
+    context_.env.persistence->save_offset(context_.settings.name, *record, {});
+    own_canary();
     return std::nullopt;
   }
   const bool restorable = earlier_.run().position() == Position::saved &&
@@ -279,8 +288,14 @@ std::optional<OffsetRecord> DriveConnection::restorable_position() {
 
 /// What it says may come true again by chance, but never by right.
 void DriveConnection::void_saved_position() {
-  earlier_.run().tried();
+  own_canary();
   saved_.void_saved_position();
+}
+
+/// Nothing of an earlier run is taken over any more.
+void DriveConnection::own_canary() {
+  earlier_.run().tried();
+  saved_.own_canary();
 }
 
 /// `restorable`: takes that position over.
@@ -288,18 +303,20 @@ Task<Result<void>> DriveConnection::configure(std::optional<OffsetRecord> restor
   // A terminal's motion is not disturbed by writing parameters under it.
   if (shaft_.sample()->moving || (shaft_.found_in_motion() && found_by_terminal()))
     co_return fail(context_.error(Reason::moving, "a terminal moves the drive; it is configured at rest"));
+  if (!restorable) own_canary();
   const auto configured = co_await context_.drive->configure();
   if (!configured && configured.error().reason == Reason::rebooted) on_reboot(configured.error());
   if (!configured) co_return configured;
   if (sequences_.life().ends()) co_return fail(context_.ending());
   link_.configured();
   reader_.continuity().proven(context_.env.clock->now());
-  earlier_.run().tried();
+  own_canary();
   drift_.applied();
   if (restorable) {
     shaft_.tracker().restore(restorable->offset_pulses);
     saved_.remember_position();
   }
+  saved_.drop_canary();
   co_return Result<void>{};
 }
 
@@ -370,8 +387,7 @@ void DriveConnection::on_reboot(const Error& cause) {
   stopper_.machine().restarted();
   stopper_.machine().unseen_start().restarted();
   readings_.lose_trust();
-  if (context_.env.persistence != nullptr)
-    forget_position(*context_.env.persistence, context_.settings.name, true);
+  saved_.void_saved_position();
   shaft_.tracker().restart(shaft_.sample() ? shaft_.sample()->position_pulses : 0);
   publisher_.publish();
   shaft_.sampled().notify_all();

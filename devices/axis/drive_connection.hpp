@@ -78,6 +78,7 @@ class DriveConnection {
   Task<Result<void>> prove_or_configure();
   [[nodiscard]] std::optional<OffsetRecord> restorable_position();
   void void_saved_position();
+  void own_canary();
   Task<Result<void>> configure(std::optional<OffsetRecord> restorable);
   Task<> wait_for_port();
 

@@ -44,9 +44,27 @@ void SavedPosition::correct_saved_position() {
 }
 
 void SavedPosition::void_saved_position() {
-  if (context_.env.persistence != nullptr)
-    forget_position(*context_.env.persistence, context_.settings.name,
-                    power_.state() == PowerMachine::State::restarted);
+  if (context_.env.persistence == nullptr) return;
+  forget_position(*context_.env.persistence, context_.settings.name,
+                  power_.state() == PowerMachine::State::restarted);
+  const bool closing = life_.state() == AxisLife::State::closing;
+  if (closing)
+    keep_canary(PositionTrust::unknown);  // retired, the axis that comes after it goes by the record
+}
+
+void SavedPosition::keep_canary(PositionTrust trust) {
+  if (context_.env.persistence == nullptr || !owns_canary_ || !context_.drive->continuity_mark()) return;
+  context_.env.persistence->save_offset(context_.settings.name,
+                                        offset_record(shaft_.tracker().offset(), trust), {});
+}
+
+void SavedPosition::drop_canary() {
+  if (context_.env.persistence == nullptr || shaft_.tracker().trust() != PositionTrust::unknown) return;
+  const auto& axes = context_.env.persistence->current().axes;
+  const auto found = axes.find(context_.settings.name);
+  const bool kept =
+      found != axes.end() && found->second.offset && found->second.offset->canary != restart_mark();
+  if (kept) void_saved_position();
 }
 
 Task<Result<void>> SavedPosition::journal_offset(std::int64_t offset, PositionTrust trust) {

@@ -55,7 +55,11 @@ void expect_verdict(const store::Verdict& verdict) {
   expect(verdict.state.journal.pair == "new", "no older copy fits any more");
   expect(state.start_count >= store::start_count_jump, "no id is given out twice");
   expect(!state.convictions.empty(), "motion waits");
-  expect(std::ranges::none_of(state.axes, [](const auto& axis) { return axis.second.offset.has_value(); }),
+  expect(std::ranges::none_of(state.axes,
+                              [](const auto& axis) {
+                                return axis.second.offset &&
+                                       axis.second.offset->trust != PositionTrust::unknown;
+                              }),
          "no position is trusted");
   const bool journal = std::ranges::count(verdict.fresh, KeptFile::journal, &Conviction::file) > 0;
   expect(!journal || (state.inhibit.active && !verdict.doubt.empty()), "what the journal knew may be lost");

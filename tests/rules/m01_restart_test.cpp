@@ -188,6 +188,58 @@ TEST(M01, ARestartBehindAnExchangeOfTheAxisIsNoticed) {
   EXPECT_THAT(refused.error().message, HasSubstr("switched off and on"));
 }
 
+/// What had proven that the drive kept its memory is kept until there is something newer that does, also
+/// where a run of the daemon never gets as far as to use the drive.
+TEST(M01, ARestartBehindARunThatCouldNotConfigureIsNoticed) {
+  enum class Before : std::uint8_t { nothing, energised, positioned };
+  for (const auto before : {Before::nothing, Before::energised, Before::positioned})
+    for (const bool restarted : {true, false}) {
+      SCOPED_TRACE(testing::Message() << static_cast<int>(before) << (restarted ? ", restarted" : ""));
+      Rig rig({.connect = before != Before::nothing, .persistence = true, .journal = true});
+      if (before != Before::nothing) before == Before::energised ? rig.enable() : rig.ready();
+      rig.stop_daemon();
+      // A function that starts motion cannot be written to a drive that is energised.
+      auto& inputs = rig.configuration.axes.at(0).axis.inputs;
+      inputs.push_back({.terminal = "X4", .function = "jog_positive"});
+      if (before == Before::nothing) rig.store.saved = {};
+      rig.start_daemon(false);
+      rig.run(3s);
+      ASSERT_EQ(rig.state()->link, LinkState::configuring);
+      rig.stop_daemon();
+      inputs.pop_back();
+      if (restarted) rig.cycle_power(10ms);
+      rig.idle(2s);
+      rig.start_daemon();
+      ASSERT_TRUE(rig.state()->enabled);
+      const auto move = rig.try_submit(MoveRelativeRequest{.distance = 1});
+      ASSERT_EQ(move.has_value(), !restarted) << (move ? "" : move.error().message);
+      if (!move) EXPECT_THAT(move.error().message, HasSubstr("switched off and on"));
+    }
+}
+
+/// What ends with the daemon, as a quick stop that costs an open loop its position, takes back no more than
+/// that.
+TEST(M01, ARestartBehindAnEndInTheMidstOfAQuickStopIsNoticed) {
+  for (auto at = 0ms; at <= 60ms; at += 4ms) {
+    SCOPED_TRACE(at.count());
+    Rig rig({.persistence = true, .journal = true});
+    rig.ready();
+    rig.submit(MoveAbsoluteRequest{.position = 100});
+    rig.run(500ms);
+    rig.submit(StopRequest{.kind = StopKind::quick_stop});
+    rig.run(at);
+    rig.stop_daemon();
+    rig.cycle_power(10ms);
+    rig.idle(2s);
+    rig.start_daemon();
+    EXPECT_EQ(rig.state()->trust, PositionTrust::unknown);
+    if (rig.state()->state == AxisState::error_stop) rig.complete(ResetRequest{});
+    const auto refused = rig.try_submit(MoveRelativeRequest{.distance = 1});
+    ASSERT_FALSE(refused);
+    EXPECT_THAT(refused.error().message, HasSubstr("switched off and on"));
+  }
+}
+
 /// Nobody knows of a restart: it may have been energised, and at work, all the time.
 TEST(M01, ADriveThatIsFoundEnergisedMayMove) {
   Rig rig;

@@ -152,7 +152,7 @@ TEST(StatePair, SwappedFilesAreReadAsWhatTheyAre) {
 
 TEST(StatePair, AConvictionCostsTrustAndCountsFarAhead) {
   const auto rolled_back = judged(with(&FoundFiles::state, state(12)));
-  EXPECT_EQ(rolled_back.state.state.axes.at("x").offset, std::nullopt);
+  EXPECT_EQ(rolled_back.state.state.axes.at("x").offset->trust, PositionTrust::unknown);
   EXPECT_EQ(rolled_back.state.state.start_count, 20U + start_count_jump) << "as the journal knows it";
   EXPECT_EQ(rolled_back.state.number, 40U);
   EXPECT_EQ(rolled_back.state.journal, (JournalMark{.pair = "new", .line = 0}))
@@ -162,7 +162,8 @@ TEST(StatePair, AConvictionCostsTrustAndCountsFarAhead) {
   ASSERT_EQ(rolled_back.state.state.convictions.size(), 1U);
   EXPECT_EQ(rolled_back.state.state.convictions[0].since, noon);
   const auto lost = judged(with(&FoundFiles::journal, {}));
-  EXPECT_EQ(lost.state.state.axes.at("x").offset, std::nullopt) << "nobody vouches for the state";
+  EXPECT_EQ(lost.state.state.axes.at("x").offset->trust, PositionTrust::unknown)
+      << "nobody vouches for the state";
   EXPECT_EQ(lost.state.state.start_count, 20U + start_count_jump);
   EXPECT_THAT(lost.doubt, HasSubstr("journal.v1 is missing"));
 }
