@@ -27,10 +27,11 @@ std::int64_t band_of(const Standstill::Gauge& gauge) {
 }  // namespace
 
 bool Standstill::settles(const Look& look, const Gauge& gauge) const {
-  const bool rests = since_ && !moves_ && look.told == false;
+  const auto& rest = doubted_ ? rested_ : since_;
+  const bool rests = rest && (doubted_ || !moves_) && look.told == false;
   return rests && std::abs(look.velocity_rpm) <= settling_factor * gauge.noise_rpm &&
          unsettled_ < settling_readings &&
-         std::abs(way_between(since_->position, look.position)) <= band_of(gauge);
+         std::abs(way_between(rest->position, look.position)) <= band_of(gauge);
 }
 
 bool Standstill::moves(const Look& look, const Gauge& gauge) {
@@ -38,13 +39,15 @@ bool Standstill::moves(const Look& look, const Gauge& gauge) {
   if (speed > gauge.noise_rpm) {
     if (!settles(look, gauge)) return note(look, true);
     ++unsettled_;
-    return false;
+    return moves_;
   }
   if (look.told && (*look.told || speed <= velocity_noise_rpm)) return note(look, *look.told);
   if (!since_) {
     const bool doubted = doubted_;
+    const auto rested = rested_;
     note(look, moves_);
     doubted_ = doubted;
+    rested_ = rested;
     return moves_;
   }
   const auto band = band_of(gauge);
@@ -57,6 +60,7 @@ bool Standstill::moves(const Look& look, const Gauge& gauge) {
 
 bool Standstill::note(const Look& look, bool moves) {
   since_ = look;
+  rested_.reset();
   unsettled_ = 0;
   doubted_ = false;
   return moves_ = moves;

@@ -25,7 +25,8 @@ constexpr std::int64_t way_between(std::int32_t from, std::int32_t to) {
 ///
 /// What settles still turns a little where the drive takes it for in position, and its noise comes on top: a
 /// shaft that was at rest, and is by the drive's own word, goes on resting for some readings that are little
-/// faster than noise, as long as its position stays.
+/// faster than noise, as long as its position stays. Where its rest was doubted meanwhile, the same readings
+/// leave the doubt as it is.
 class Standstill {
  public:
   struct Look {
@@ -45,7 +46,9 @@ class Standstill {
   void forget() { *this = {}; }
   /// It may have begun to move unseen, below the noise: rest has to be shown anew.
   void doubt() {
+    if (!doubted_) rested_ = moves_ ? std::nullopt : since_;
     since_.reset();
+    unsettled_ = 0;
     moves_ = doubted_ = true;
   }
   /// It moves only as far as it has not shown its rest since doubt(): neither speed nor way tell so.
@@ -55,7 +58,8 @@ class Standstill {
   bool note(const Look& look, bool moves);
   [[nodiscard]] bool settles(const Look& look, const Gauge& gauge) const;
 
-  std::optional<Look> since_;  ///< it was there, and as it is
+  std::optional<Look> since_;   ///< it was there, and as it is
+  std::optional<Look> rested_;  ///< in doubt: it was at rest there before
   bool moves_ = false;
   bool doubted_ = false;
   int unsettled_ = 0;  ///< readings in a row that settles() was asked about

@@ -67,6 +67,23 @@ TEST_F(Motion, WhatOnlyHasToShowItsRestMovesWithoutAVelocity) {
   EXPECT_EQ(by_way(50ms, 12, 1).velocity_rpm, 1) << "its way shows it";
 }
 
+/// The motion before has just ended: what is left of its ringing is not the one that has begun.
+TEST_F(Motion, WhatSettlesWhileItsRestIsDoubtedMovesWithoutAVelocity) {
+  const auto settling = [this](Duration after, std::int32_t position, int rpm) {
+    DriveSample sample{.asked_at = start + after, .position_pulses = position, .velocity_rpm = rpm};
+    watch_.take(sample,
+                {.by_way = true, .told = false, .gauge = {.window = 10, .pulses_per_revolution = 1000}});
+    return sample;
+  };
+  EXPECT_FALSE(settling(0ms, 0, 0).moving);
+  watch_.begin(start);
+  watch_.stop(false);
+  const auto left = settling(20ms, 3, 3);
+  EXPECT_TRUE(left.moving);
+  EXPECT_EQ(left.velocity_rpm, 0);
+  EXPECT_EQ(settling(30ms, 6, 3).velocity_rpm, 3) << "its way shows it";
+}
+
 TEST_F(Motion, AStopEndsIt) {
   watch_.begin(start);
   watch_.stop(false);

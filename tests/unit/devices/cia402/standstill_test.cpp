@@ -159,6 +159,33 @@ TEST(Standstill, WhatMayHaveBegunToMoveHasToShowItsRest) {
   EXPECT_FALSE(standstill.moves(look(660ms, 2, 1, false), gauge)) << "the drive's own word counts at once";
 }
 
+/// It was in position, by the drive's own word, when its rest was doubted: what is left of its ringing is no
+/// motion that has begun.
+TEST(Standstill, TheLastOfASettlingLeavesADoubt) {
+  Standstill standstill;
+  EXPECT_FALSE(standstill.moves(look(0ms, 0, 0, false), gauge));
+  standstill.doubt();
+  for (int i = 1; i <= 5; ++i) {
+    EXPECT_TRUE(standstill.moves(look(10ms * i, i % 2 == 0 ? 3 : -3, 3, false), gauge)) << i;
+    EXPECT_TRUE(standstill.doubted()) << i;
+  }
+  EXPECT_TRUE(standstill.moves(look(60ms, 3, 3, false), gauge));
+  EXPECT_FALSE(standstill.doubted()) << "it goes on";
+  standstill.doubt();
+  EXPECT_TRUE(standstill.moves(look(80ms, 3, 3, false), gauge));
+  EXPECT_FALSE(standstill.doubted()) << "it moved before";
+}
+
+TEST(Standstill, InDoubtWhatIsFasterOrElsewhereIsAMotion) {
+  for (const auto& motion : {look(20ms, 1, 4, false), look(20ms, 6, 3, false), look(20ms, 1, 3, true)}) {
+    Standstill standstill;
+    EXPECT_FALSE(standstill.moves(look(0ms, 0, 0, false), gauge));
+    standstill.doubt();
+    EXPECT_TRUE(standstill.moves(motion, gauge));
+    EXPECT_FALSE(standstill.doubted());
+  }
+}
+
 TEST(Standstill, ADoubtLastsUntilSpeedWayOrRestShows) {
   const auto doubted = [](const std::vector<Standstill::Look>& looks) {
     Standstill standstill;
