@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include <set>
 #include <utility>
 
 #include "api/cell/gather.hpp"
@@ -19,6 +20,8 @@ constexpr Duration answer_patience = std::chrono::milliseconds(950);
 constexpr Duration exchange_patience = std::chrono::milliseconds(800);
 constexpr Duration release_patience = std::chrono::seconds(2);
 constexpr Duration spread_period = std::chrono::seconds(10);
+/// Answers come in at once. What is not on the disk yet of who was told is told once more after a restart.
+constexpr Duration told_period = std::chrono::milliseconds(100);
 
 bool is_silent(const grpc::Status& status) {
   return status.error_details().empty() && (status.error_code() == grpc::StatusCode::UNAVAILABLE ||
@@ -40,14 +43,6 @@ axisd::v1::ErrorDetail pending(std::string_view what) {
 std::string text_of(const v1::StopAllLatch& latch) {
   return fmt::format("by {} at {}{}{}", latch.by(), latch.entrance(), latch.reason().empty() ? "" : ": ",
                      config::printable(latch.reason(), 256));
-}
-
-/// In the order of their names, as they are known.
-template <class Results>
-auto& result_for(Results& results, const std::string& name) {
-  for (auto& each : results)
-    if (each.machine() == name) return each;
-  return *results.Add();
 }
 
 }  // namespace
@@ -133,6 +128,7 @@ void StopAllKeeper::keep(Answer& answer, const std::shared_ptr<Answer>& alive) {
 
 void StopAllKeeper::tell_machine(const std::string& name, const std::shared_ptr<Stopping>& stopping,
                                  const Metadata& metadata) {
+  const int index = stopping->response.machines_size();
   auto& pending_result = *stopping->response.add_machines();
   pending_result.set_machine(name);
   pending_result.set_outcome(v1::MACHINE_OUTCOME_SILENT);
@@ -148,9 +144,9 @@ void StopAllKeeper::tell_machine(const std::string& name, const std::shared_ptr<
   const auto instance = peer.answers() ? peer.last()->instance_id : std::string();
   const auto asked_at = parts_.clock.now();
   link->stop_all(metadata, machine_patience,
-                 [this, name, stopping, gather, instance, asked_at](
+                 [this, name, index, stopping, gather, instance, asked_at](
                      const grpc::Status& status, const axisd::v1::StopAllResponse& response) {
-                   auto& result = result_for(*stopping->response.mutable_machines(), name);
+                   auto& result = *stopping->response.mutable_machines(index);
                    result.set_outcome(outcome_of(status));
                    set_duration(*result.mutable_took(), parts_.clock.now() - asked_at);
                    if (status.ok() && instance.empty()) {
@@ -160,7 +156,7 @@ void StopAllKeeper::tell_machine(const std::string& name, const std::shared_ptr<
                    } else if (status.ok()) {
                      result.clear_error();
                      *result.mutable_response() = response;
-                     if (machine_.told(name, instance)) save([](const auto&) {});
+                     if (machine_.told(name, instance)) save_soon();
                    } else {
                      auto error = detail_of(status);
                      error.set_message(fmt::format("{}: {}", name, error.message()));
@@ -185,7 +181,7 @@ void StopAllKeeper::tell_again(const std::string& name, const std::string& insta
         if (!status.ok()) return machine_.not_told(name);
         if (!machine_.told(name, instance_id)) return;
         ++told_again_;
-        save([](const auto&) {});
+        save_soon();
         v1::CellEvent event;
         event.set_kind(v1::CELL_EVENT_KIND_STOP_ALL_TOLD);
         event.set_machine(name);
@@ -224,6 +220,7 @@ void StopAllKeeper::release_machines(const std::shared_ptr<Releasing>& releasing
     std::exchange(releasing->done, {})(releasing->response);
   });
   for (const auto& [name, entry] : parts_.machines.roster().entries()) {
+    const int index = releasing->response.machines_size();
     auto& waiting = *releasing->response.add_machines();
     waiting.set_machine(name);
     waiting.set_outcome(v1::MACHINE_OUTCOME_SILENT);
@@ -233,8 +230,8 @@ void StopAllKeeper::release_machines(const std::shared_ptr<Releasing>& releasing
     if (link == nullptr || !entry.peer.is_open()) continue;
     releasing->gather->add();
     link->release_stop_all(releasing->metadata, release_patience,
-                           [name, releasing, gather = releasing->gather](const grpc::Status& status) {
-                             auto& result = result_for(*releasing->response.mutable_machines(), name);
+                           [index, releasing, gather = releasing->gather](const grpc::Status& status) {
+                             auto& result = *releasing->response.mutable_machines(index);
                              result.set_outcome(outcome_of(status));
                              result.clear_error();
                              if (!status.ok()) *result.mutable_error() = detail_of(status);
@@ -251,6 +248,14 @@ void StopAllKeeper::save(Done done) {
                       if (!written) spdlog::error("{}", to_string(written.error()));
                       done(written ? std::nullopt : std::optional(detail_of(written.error())));
                     });
+}
+
+void StopAllKeeper::save_soon() {
+  if (std::exchange(to_save_, true)) return;
+  saving_ = parts_.clock.call_at(parts_.clock.now() + told_period, [this] {
+    to_save_ = false;
+    save([](const auto&) {});
+  });
 }
 
 void StopAllKeeper::share(Done done, int attempts) {
@@ -290,6 +295,8 @@ void StopAllKeeper::read(const etcd::Versioned& key) {
 v1::ExchangeStopAllResponse StopAllKeeper::exchange(const v1::ExchangeStopAllRequest& request) {
   const auto merged = machine_.merge(request.latches());
   take_in(merged);
+  const std::set<std::string> reached(request.reached().begin(), request.reached().end());
+  tell_if([&](const std::string& name) { return !reached.contains(name); });
   if (merged.changed()) share([](const auto&) {});
   v1::ExchangeStopAllResponse response;
   *response.mutable_latches() = machine_.record().latches();
@@ -304,15 +311,24 @@ void StopAllKeeper::take_in(const StopAllMachine::Merged& merged) {
     announce(v1::CELL_EVENT_KIND_STOP_ALL_RELEASED, latch,
              fmt::format("StopAll of the cell by {} was released by {}", latch.by(), latch.released_by()));
   save([](const auto&) {});
-  if (merged.began.empty()) return;
+  if (!merged.began.empty())
+    tell_if([&](const std::string& name) { return name == parts_.settings.machine; });
+}
+
+/// Whoever was asked tells all machines that it reaches. Where all entrances did so at once, a cell of 100
+/// machines would send 10,000 of them. Whoever is not told here is asked within a second, and told where
+/// nothing holds it by then.
+void StopAllKeeper::tell_if(const std::function<bool(const std::string&)>& wanted) {
   for (const auto& [name, entry] : parts_.machines.roster().entries())
-    if (entry.peer.answers()) seen(name, *entry.peer.last());
+    if (entry.peer.answers() && wanted(name)) seen(name, *entry.peer.last());
 }
 
 void StopAllKeeper::spread(std::function<void()> done) {
   v1::ExchangeStopAllRequest request;
   request.set_cell(parts_.settings.cell);
   *request.mutable_latches() = machine_.record().latches();
+  for (const auto& [name, entry] : parts_.machines.roster().entries())
+    if (entry.peer.is_open()) request.add_reached(name);
   const auto gather = Gather::begin(parts_.clock, exchange_patience, std::move(done));
   for (const auto& [name, entry] : parts_.machines.roster().entries()) {
     auto* const link = parts_.machines.link(name);

@@ -43,8 +43,11 @@ class StopAllKeeper {
   /// What another entrance knows; what this one knows then.
   [[nodiscard]] v1::ExchangeStopAllResponse exchange(const v1::ExchangeStopAllRequest& request);
 
-  /// Others are not told any more.
-  void end() { spreading_.reset(); }
+  /// Others are not told any more, and nothing is written.
+  void end() {
+    spreading_.reset();
+    saving_.reset();
+  }
   /// A machine has said who it is.
   void seen(const std::string& machine, const PeerAnswer& answer);
   /// The key in etcd is this now.
@@ -70,11 +73,15 @@ class StopAllKeeper {
   using Done = std::function<void(std::optional<axisd::v1::ErrorDetail>)>;
   /// On the disk.
   void save(Done done);
+  /// The same within 100 ms, with what else comes until then.
+  void save_soon();
   /// In etcd, together with what is there already.
   void share(Done done, int attempts = 4);
   /// With all other entrances that can be reached; `done` when all have answered.
   void spread(std::function<void()> done);
   void take_in(const StopAllMachine::Merged& merged);
+  /// Those that answer and are wanted, where they were not told.
+  void tell_if(const std::function<bool(const std::string& machine)>& wanted);
   void announce(v1::CellEventKind kind, const v1::StopAllLatch& latch, std::string text);
   void spread_now_and_then();
 
@@ -84,7 +91,8 @@ class StopAllKeeper {
   std::optional<Error> not_durable_;
   etcd::Versioned key_;
   std::uint64_t last_id_ = 0, told_again_ = 0;
-  Clock::Timer spreading_;
+  bool to_save_ = false;
+  Clock::Timer spreading_, saving_;
 };
 
 }  // namespace axisd::cell

@@ -37,6 +37,18 @@ class StopAll(CellScenario):
             wait_for(lambda e=entrance: [latch.reason for latch in e.get().stop_all] == ["somebody shouted"],
                      "each entrance knows of it")
 
+    def test_entrances_that_hear_of_it_do_not_tell_everybody_once_more(self):
+        """Else a cell of 100 machines sends 10,000 of them."""
+        self.cell()
+        self.entrances[0].stop_all()
+        for entrance in self.entrances:
+            wait_for(lambda e=entrance: e.get().stop_all, "each entrance knows of it")
+        time.sleep(2.5)  # longer than any entrance takes to ask a machine
+        times = [machine.daemon.log().count("stop_all of 1 axes") for machine in self.presses]
+        self.assertTrue(all(times), times)
+        # By the entrance that was asked, and by the one beside it. Whoever asked a machine right before may be one more.
+        self.assertLess(sum(times), 9, times)
+
     def test_a_dead_machine_is_named_and_latched_when_it_comes_back(self):
         self.cell()
         self.presses[2].daemon.kill()
