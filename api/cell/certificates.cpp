@@ -1,5 +1,6 @@
 #include "api/cell/certificates.hpp"
 
+#include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
 #include <fstream>
@@ -29,19 +30,46 @@ std::vector<std::string> paths_of(const Settings& settings) {
   return paths;
 }
 
+std::string content_of(const std::string& path) {
+  const std::ifstream file(path);
+  std::ostringstream text;
+  text << file.rdbuf();
+  return text.str();
+}
+
+/// Of one section of the configuration: where its files are, and what they hold.
+struct Section {
+  tls::Files paths, contents;
+  std::string_view certificate, authority, crl;  ///< their keys: literals
+};
+
 /// Of all that is used. Blocks for the disk.
 std::vector<tls::Expiry> expiries_of(const Settings& settings, const tls::Live* live) {
-  std::vector<tls::Expiry> all;
+  std::vector<Section> sections;
   if (live != nullptr)
-    all = tls::expiries(live->paths(), live->served()->contents, std::chrono::system_clock::now());
-  for (const auto& files : {settings.axisd.tls, settings.etcd.tls}) {
-    if (files.certificate.empty()) continue;
-    const std::ifstream file(files.certificate);
-    std::ostringstream text;
-    text << file.rdbuf();
-    all.push_back(
-        {.path = files.certificate, .what = "the certificate", .at = tls::first_expiry(text.str())});
-  }
+    sections.push_back({.paths = live->paths(),
+                        .contents = live->served()->contents,
+                        .certificate = "tls.certificate",
+                        .authority = "tls.client_ca",
+                        .crl = "tls.crl"});
+  const auto add = [&](const auto& files, std::string_view certificate, std::string_view authority) {
+    if (files.certificate.empty()) return;
+    sections.push_back(
+        {.paths = {.certificate = files.certificate, .client_ca = files.ca},
+         .contents = {.certificate = content_of(files.certificate), .client_ca = content_of(files.ca)},
+         .certificate = certificate,
+         .authority = authority});
+  };
+  add(settings.axisd.tls, "axisd.tls.certificate", "axisd.tls.ca");
+  add(settings.etcd.tls, "etcd.tls.certificate", "etcd.tls.ca");
+  std::vector<tls::Expiry> all;
+  for (const auto& section : sections)
+    for (auto expiry : tls::expiries(section.paths, section.contents, std::chrono::system_clock::now())) {
+      const bool is_authority = expiry.key == "client_ca";
+      if (is_authority) expiry.what = "an authority";  // all of them may be one file
+      expiry.key = is_authority ? section.authority : expiry.key == "crl" ? section.crl : section.certificate;
+      all.push_back(std::move(expiry));
+    }
   return all;
 }
 
@@ -91,10 +119,18 @@ std::vector<std::string> Certificates::expired(WallTime now) const {
   return lines;
 }
 
+void Certificates::tell(spdlog::level::level_enum level, std::string text) {
+  spdlog::log(level, "{}", text);
+  v1::CellEvent event;
+  event.set_kind(v1::CELL_EVENT_KIND_CERTIFICATE);
+  event.set_text(std::move(text));
+  cell_->events().tell(std::move(event));
+}
+
 void Certificates::remind() {
   const auto now = clock_->now();
-  for (const auto& notice : reminder_.due(expiries_, clock_->wall(now), now))
-    spdlog::log(notice.over ? spdlog::level::err : spdlog::level::warn, "{}", notice.text);
+  for (auto& notice : reminder_.due(expiries_, clock_->wall(now), now))
+    tell(notice.over ? spdlog::level::err : spdlog::level::warn, std::move(notice.text));
 }
 
 void Certificates::keep(Clock& clock, Cell& cell) {
@@ -123,7 +159,8 @@ void Certificates::look() {
       },
       [this, found, cell = cell_] {
         if (found->error)
-          spdlog::error("certificates: {}; what was used before stays", to_string(*found->error));
+          tell(spdlog::level::err,
+               fmt::format("certificates: {}; what was used before stays", to_string(*found->error)));
         if (!found->trust) return;
         if (!found->error) spdlog::info("certificates were read again");
         expiries_ = std::move(found->expiries);

@@ -1,6 +1,8 @@
 // The certificates of the entrance, as a server and as a client, which may be replaced while it runs.
 #pragma once
 
+#include <spdlog/common.h>
+
 #include <memory>
 #include <string>
 #include <vector>
@@ -25,6 +27,8 @@ class Certificates {
   [[nodiscard]] std::shared_ptr<const tls::Live> live() const { return live_; }
   /// What has expired, a line each: others do not let this entrance in, or are not let in.
   [[nodiscard]] std::vector<std::string> expired(WallTime now) const;
+  /// When what is used now ends, by its key in the configuration.
+  [[nodiscard]] const std::vector<tls::Expiry>& expiries() const { return expiries_; }
   /// From now on files that were replaced are read again. What is not usable is told, and what was served
   /// stays; what ends soon, or has ended, is told every day. Once; this is not moved any more, and outlives
   /// neither of them.
@@ -35,6 +39,8 @@ class Certificates {
   [[nodiscard]] static Result<Trust> trust_of(const Settings& settings);
   void look();
   void remind();
+  /// In the log, and as an event.
+  void tell(spdlog::level::level_enum level, std::string text);
 
   const Settings* settings_;
   std::shared_ptr<tls::Live> live_;

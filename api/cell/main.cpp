@@ -65,7 +65,10 @@ Duration watchdog_interval() {
 /// Tells the metrics what there is.
 class Pulse {
  public:
-  Pulse(Clock& clock, const Cell& cell) : clock_(clock), cell_(cell) { beat(); }
+  Pulse(Clock& clock, const Cell& cell, const Certificates& certificates)
+      : clock_(clock), cell_(cell), certificates_(certificates) {
+    beat();
+  }
   /// Thread: any.
   [[nodiscard]] std::shared_ptr<const Reading> reading() const {
     const std::lock_guard lock(mutex_);
@@ -74,7 +77,9 @@ class Pulse {
 
  private:
   void beat() {
-    auto reading = std::make_shared<const Reading>(cell_.reading());
+    auto all = cell_.reading();
+    all.certificates = certificates_.expiries();
+    auto reading = std::make_shared<const Reading>(std::move(all));
     {
       const std::lock_guard lock(mutex_);
       reading_.swap(reading);
@@ -83,6 +88,7 @@ class Pulse {
   }
   Clock& clock_;
   const Cell& cell_;
+  const Certificates& certificates_;
   mutable std::mutex mutex_;
   std::shared_ptr<const Reading> reading_;  ///< under mutex_
   Clock::Timer timer_;
@@ -143,7 +149,7 @@ int serve(const Settings& settings, const std::string& machine_id_file, Certific
   const auto port = entrance.open();
   if (!port) program::leave_at_once(give_up(port.error()));
   cell.start();
-  const Pulse pulse(clock, cell);
+  const Pulse pulse(clock, cell, certificates);
   const Watch watch(
       clock, watchdog_interval(),
       [&] {

@@ -120,6 +120,14 @@ void write_calls(Exposition& to, const Reading& reading) {
   to.histogram({}, reading.durations);
 }
 
+void write_certificates(Exposition& to, const Reading& reading) {
+  to.family("axisd_cell_certificate_expiry_timestamp_seconds", MetricType::gauge,
+            "When the first certificate or list in a file of this entrance ends, in Unix time.");
+  for (const auto& file : reading.certificates)
+    to.sample(Labels().with("file", file.key),
+              std::chrono::duration_cast<std::chrono::seconds>(file.at.time_since_epoch()).count());
+}
+
 }  // namespace
 
 std::string render(const Reading& reading, metrics::Format format) {
@@ -129,6 +137,7 @@ std::string render(const Reading& reading, metrics::Format format) {
   write_clocks(to, reading);
   write_moves(to, reading);
   write_calls(to, reading);
+  write_certificates(to, reading);
   return to.take();
 }
 

@@ -12,6 +12,7 @@
 #include "api/cell/group_moves.hpp"
 #include "api/cell/routes.hpp"
 #include "api/exposition/exposition.hpp"
+#include "api/tls/expiry.hpp"
 #include "axisd/cell/v1/cell_service.pb.h"
 #include "buses/clock.hpp"
 #include "buses/latency_histogram.hpp"
@@ -44,6 +45,7 @@ struct Reading {
   int open_moves = 0;
   GroupMoves::Tally moves;  ///< of several machines
   LatencyHistogram durations;
+  std::vector<tls::Expiry> certificates;
 };
 
 /// As Prometheus reads it. Labels have names of machines and constants of this program. Pure.

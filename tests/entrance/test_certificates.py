@@ -1,4 +1,5 @@
 """Who calls an entrance, by certificates; whom machines are told of; certificates that are replaced."""
+import pathlib
 import re
 import shutil
 import time
@@ -7,8 +8,9 @@ import unittest
 import grpc
 
 from certificates import Certificates
-from harness import OWN_NAME, Client, axis_pb, pb, run, spinner, system_pb, wait_for
-from support import AXISD_CELL, PRESENT, SILENT, CallFailed, CellScenario, cell_pb, cell_service_pb2_grpc
+from harness import LIMIT, OWN_NAME, Client, axis_pb, pb, run, spinner, system_pb, wait_for
+from harness.scrape import scrape
+from support import AXISD_CELL, HOST, PRESENT, SILENT, CallFailed, CellScenario, cell_pb, cell_service_pb2_grpc
 
 #: The entrance comes by a unix socket, as this user of the computer, and so do the tests themselves.
 ACCESS = f"access: {{ roles: {{ {OWN_NAME}: maintainer, cell.hall-1: viewer }}, " \
@@ -168,6 +170,36 @@ class CertificatesOfCallers(CellScenario):
         # One that press-2 does not accept.
         self.put("stranger", self.others)
         wait_for(lambda: self.machines(anna).get("press-2") == SILENT, "press-2 does not answer a stranger")
+
+    def events_of_certificates(self, client):
+        """What the entrance has told of certificates, a line each."""
+        stream = client.cell.WatchEvents(cell_pb.WatchEventsRequest(after_sequence=0), timeout=LIMIT)
+        message = next(iter(stream))
+        stream.cancel()
+        return [event.text for event in message.events if event.kind == cell_pb.CELL_EVENT_KIND_CERTIFICATE]
+
+    def test_when_certificates_end_is_told(self):
+        """As an event, 30 days ahead, and as a figure."""
+        self.keys += f'metrics: {{ listen: "{HOST}:0" }}\n'
+        here = self.begin_with_another_machine()
+        anna = self.connect("anna")
+        own = f"{self.one.directory}/own.crt"
+        text = wait_for(lambda: [each for each in self.events_of_certificates(anna) if own in each], "it is told")[0]
+        self.assertIn("the certificate expires in 1 day", text)
+        port = wait_for(lambda: re.search(r"metrics at port (\d+)", here.program.log()), "it tells the port")[1]
+
+        def left():
+            found = scrape(f"http://{HOST}:{port}/metrics").named("axisd_cell_certificate_expiry_timestamp_seconds")
+            return {labels["file"]: (at - time.time()) / 86400 for labels, at in found}
+        days = left()
+        self.assertEqual(set(days), {"tls.certificate", "tls.client_ca", "axisd.tls.certificate", "axisd.tls.ca"})
+        self.assertTrue(1.9 < days["axisd.tls.certificate"] < 2.1, days)
+        self.authority.issue("cell.hall-1", days=90)
+        self.put("cell.hall-1")
+        wait_for(lambda: left()["axisd.tls.certificate"] > 80, "the figure is that of the new one")
+        (pathlib.Path(self.one.directory) / "own.crt").write_text("nothing")
+        wait_for(lambda: any("what was used before stays" in each for each in self.events_of_certificates(anna)),
+                 "files that cannot be used are told")
 
     def test_certificates_that_have_expired(self):
         """Of a caller, of the entrance before other machines, and of the entrance before its callers."""

@@ -195,8 +195,8 @@ class CellReleased:
 
 @dataclasses.dataclass(frozen=True)
 class CellEvent:
-    """What the entrance saw. `kind`: "machine", "registry", "stop_all", "stop_all_released", "stop_all_told", "conflict" or
-    "group_move", of which `raw.group_move` has the step.
+    """What the entrance saw. `kind`: "machine", "registry", "stop_all", "stop_all_released", "stop_all_told", "conflict",
+    "certificate" or "group_move", of which `raw.group_move` has the step.
     `machine`: empty: it is about the cell. `before` and `state`: of a machine. `lost`: events before this one that are no
     longer kept."""
     sequence: int
