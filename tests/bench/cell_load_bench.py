@@ -39,7 +39,8 @@ def make_stubs(directory):
 
 def make_pki(directory):
     authority = Certificates(directory, "ca")
-    authority.issue("load")
+    for name in ("load", "cell.load"):  # the client, and the entrances
+        authority.issue(name)
     return directory
 
 
@@ -60,12 +61,13 @@ def etcd(directory):
 def entrance(build, directory, pki, own, metrics):
     path, state = pathlib.Path(directory) / "cell.yaml", f"{directory}/state"
     shutil.rmtree(state, ignore_errors=True)
-    files = f"ca: {pki}/ca.crt, certificate: {pki}/load.crt, key: {pki}/load.key"
+    files = f"ca: {pki}/ca.crt, certificate: {pki}/cell.load.crt, key: {pki}/cell.load.key"
     path.write_text(f"""cell: load
 machine: {own['name']}
 listen: {ENTRANCE}
 advertise: {ENTRANCE}
-tls: {{ certificate: {pki}/load.crt, key: {pki}/load.key, client_ca: {pki}/ca.crt }}
+tls: {{ certificate: {pki}/cell.load.crt, key: {pki}/cell.load.key, client_ca: {pki}/ca.crt }}
+roles: {{ load: maintainer }}
 axisd: {{ server: {own['axisd']}, stop_server: {own['stop']}, advertise: {own['axisd']}, tls: {{ {files} }} }}
 etcd: {{ endpoints: [ {ETCD} ], ttl: 15 s }}
 state: {state}
@@ -73,6 +75,14 @@ state: {state}
 """, encoding="utf-8")
     with running(f"{build}/api/cell/axisd-cell", "--config", path) as process:
         yield process.pid
+
+
+@contextlib.contextmanager
+def generator(*words):
+    """cell_load.py, and the addresses of its machines."""
+    with running(sys.executable, "-B", f"{ROOT}/tests/bench/cell_load.py", *map(str, words), stdin=subprocess.PIPE,
+                 stdout=subprocess.PIPE, text=True) as process:
+        yield process, json.loads(process.stdout.readline())
 
 
 class Client:
@@ -138,9 +148,7 @@ def resident_kib(pid):
 def measure(build, directory, pki, stubs, given, count, metrics):
     with contextlib.ExitStack() as stack:
         stack.enter_context(etcd(directory))
-        load = stack.enter_context(running(sys.executable, "-B", f"{ROOT}/tests/bench/cell_load.py", stubs, pki, ETCD,
-                                           str(count), str(given.axes), stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True))
-        machines = json.loads(load.stdout.readline())
+        load, machines = stack.enter_context(generator(stubs, pki, ETCD, count, given.axes))
         pid = stack.enter_context(entrance(build, directory, pki, machines[0], metrics))
         client = Client(pki)
         there = client.wait_for_all(count)

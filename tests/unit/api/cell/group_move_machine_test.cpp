@@ -40,6 +40,26 @@ TEST(GroupMoveMachine, EachIsPreparedMeasuredToldAndRenewed) {
   EXPECT_EQ(bench.asked(Kind::renew), (std::vector<std::size_t>{0, 1, 2}));
 }
 
+TEST(GroupMoveMachine, SixteenMachinesAreAskedAsOftenEachAsThree) {
+  const auto errands_of = [](std::size_t machines) {
+    Bench bench(machines);
+    std::size_t errands = bench.wire.size();
+    bench.prepare();
+    for (auto asked = bench.take(Kind::measure); !asked.empty(); asked = bench.take(Kind::measure)) {
+      errands += asked.size();
+      for (const auto& errand : asked)
+        bench.add(bench.move.measured(errand.machine, bench.answer(errand.machine, COMMAND_STATE_ACCEPTED)));
+    }
+    errands += bench.wire.size();
+    bench.tell();
+    EXPECT_EQ(bench.move.state(), State::running) << machines;
+    errands += bench.take(Kind::renew).size();
+    bench.pass(GroupMoveMachine::renewal_period + 10ms);
+    return errands + bench.take(Kind::renew).size();
+  };
+  EXPECT_EQ(errands_of(16) * 3, errands_of(3) * 16);
+}
+
 /// While it runs they do not tell their members, which are stopped by their commands all the same.
 TEST(GroupMoveMachine, MembersAreKnownFromThePreparation) {
   Bench bench;
