@@ -33,9 +33,6 @@ constexpr Duration count_usually = std::chrono::milliseconds(10), count_soon = s
 constexpr int receive_buffer = 128 * 1024;
 /// With TLS and all that gRPC sends around it.
 constexpr int most_of_a_stop = 4096;
-constexpr Duration memory_every = heartbeat;
-/// Of connections that have left: they took more than is worth giving back.
-constexpr std::int64_t many_streams = 1024;
 constexpr std::string_view floods = "sends floods of requests that it wants no answers to";
 
 int descriptor_limit() {
@@ -59,12 +56,10 @@ Result<void> AcceptLoop::start(std::vector<Entry> entries, const PeerBudgets::Li
   budgets_.emplace(limits);
   streams_.emplace(streams);
   streams_of_one_ = streams.of_one;
-  trims_.emplace(resident_memory());
-  memory_limit_ = limits.memory;
   leaving_ = limits.leaving;
   in_progress_ = std::move(in_progress);
   entries_ = std::move(entries);
-  trimmer_.start();
+  memory_.start(limits.memory);
   tcp_.start();
   local_.start();
   thread_ = std::thread([this] { run(); });
@@ -80,7 +75,7 @@ void AcceptLoop::stop() {
   }
   tcp_.stop();
   local_.stop();
-  trimmer_.stop();
+  memory_.stop();
   entries_.clear();
 }
 
@@ -107,7 +102,7 @@ void AcceptLoop::run() {
     }
     progress_.store(monotonic_now(), std::memory_order_relaxed);
     const auto pause =
-        std::chrono::ceil<std::chrono::milliseconds>(connections_.empty() ? heartbeat : count_every_);
+        std::chrono::ceil<std::chrono::milliseconds>(connections_.empty() ? heartbeat : counting_.every);
     if (poll(polled.data(), polled.size(), static_cast<int>(pause.count())) < 0 && errno != EINTR) {
       spdlog::error("accept loop: poll: {}", std::generic_category().message(errno));
       return;
@@ -120,8 +115,8 @@ void AcceptLoop::run() {
     bool fine = true;
     for (std::size_t i = 0; i < entries_.size(); ++i)
       if (polled[i + 1].revents != 0) fine = accept_one(entries_[i]) && fine;
-    if (const auto now = monotonic_now(); now - counted_ >= count_every_) {
-      counted_ = now;
+    if (const auto now = monotonic_now(); now - counting_.last >= counting_.every) {
+      counting_.last = now;
       count_traffic(now);
       look_at_leaving(now);
       for (auto* way : {&tcp_, &local_}) look_at_hand_over(*way, now);
@@ -167,7 +162,7 @@ void AcceptLoop::look_at_leaving(TimePoint now) {
 /// gRPC closes its own descriptor by itself.
 void AcceptLoop::close(PeerBudgets::Id connection) {
   budgets_->leave(connection);
-  streams_gone_ += streams_->leave(connection);
+  memory_.gone(streams_->leave(connection));
   if (const auto found = connections_.find(connection); found != connections_.end()) {
     found->second.way->take_back(connection);
     counts_.forget(found->second.peer);
@@ -186,7 +181,7 @@ void AcceptLoop::count_streams(const std::map<PeerBudgets::Id, PeerBudgets::Traf
                                TimePoint now) {
   for (const auto& [id, total] : traffic) streams_->received(id, total.received);
   const auto asked = streams_->doubtful(now);
-  count_every_ = asked.empty() ? count_usually : count_soon;
+  counting_.every = asked.empty() ? count_usually : count_soon;
   if (asked.empty()) return;
   look_at_streams(asked, now);
   for (const auto id : streams_->beyond(now)) blame(id, "keeps too many streams open", now);
@@ -237,26 +232,18 @@ void AcceptLoop::blame(PeerBudgets::Id id, std::string_view why, TimePoint now) 
 
 void AcceptLoop::cut_off(PeerBudgets::Id id, std::string_view why) {
   const auto& connection = connections_.at(id);
-  if (std::has_single_bit(++cut_off_))
-    spdlog::warn("a client at {} {}: cut off ({} since start)", connection.address, why, cut_off_);
+  if (std::has_single_bit(++tally_.cut_off))
+    spdlog::warn("a client at {} {}: cut off ({} since start)", connection.address, why, tally_.cut_off);
   reset(connection.fd->get());
-  trims_->let_go(monotonic_now());
+  memory_.let_go(monotonic_now());
   close(id);
 }
 
 void AcceptLoop::look_at_memory(TimePoint now) {
-  if (now - looked_ < memory_every) return;
-  looked_ = now;
-  const auto bytes = resident_memory();
-  if (bytes > memory_limit_)
+  memory_.look(now, [this] {
     if (const auto most = budgets_->most_one_sided())
       cut_off(*most, "has sent most without an answer, and memory is short");
-  if (streams_gone_ >= many_streams) {
-    streams_gone_ = 0;
-    trims_->let_go(now);
-  }
-  if (const auto left = trimmer_.take_left(); left > 0) trims_->trimmed(left);
-  if (trims_->due(now, bytes)) trimmer_.trim();
+  });
 }
 
 bool AcceptLoop::accept_one(const Entry& entry) {
@@ -301,9 +288,9 @@ bool AcceptLoop::make_room(const std::string& address, TimePoint now) {
     if (!id) return false;
     const auto& connection = connections_.at(*id);
     if (!budgets_->still_gives_way(*id, traffic_of(connection.fd->get()), now)) continue;
-    if (std::has_single_bit(++gave_way_))
+    if (std::has_single_bit(++tally_.gave_way))
       spdlog::info("an idle connection from {} gives way to a new one from {} ({} since start)",
-                   connection.address, address, gave_way_);
+                   connection.address, address, tally_.gave_way);
     ::shutdown(connection.fd->get(), SHUT_RDWR);
     close(*id);
     return true;
@@ -312,7 +299,7 @@ bool AcceptLoop::make_room(const std::string& address, TimePoint now) {
 }
 
 void AcceptLoop::refuse(PeerBudgets::Entry why, const std::string& address) {
-  const auto count = ++refused_;
+  const auto count = ++tally_.refused;
   if (!std::has_single_bit(count)) return;
   const auto* reason = why == PeerBudgets::Entry::address_floods ? "it sends floods of requests"
                        : why == PeerBudgets::Entry::address_full
@@ -329,7 +316,7 @@ bool AcceptLoop::turn_away(const Entry& entry) {
   surplus = {};
   reserve_ = FileDescriptor(open("/dev/null", O_RDONLY | O_CLOEXEC));
   if (!closed) return false;  // somebody else took the reserve meanwhile
-  const auto count = ++refused_;
+  const auto count = ++tally_.refused;
   if (std::has_single_bit(count))
     spdlog::error("out of file descriptors: {} connections turned away since start; raise LimitNOFILE",
                   count);

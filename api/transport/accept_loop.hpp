@@ -15,11 +15,10 @@
 
 #include "api/transport/hand_over_thread.hpp"
 #include "api/transport/listen.hpp"
-#include "api/transport/memory_trimmer.hpp"
+#include "api/transport/memory_keeper.hpp"
 #include "api/transport/peer_budgets.hpp"
 #include "api/transport/stream_budget.hpp"
 #include "api/transport/stream_counts.hpp"
-#include "api/transport/trim_plan.hpp"
 
 namespace axisd::transport {
 
@@ -51,7 +50,7 @@ class AcceptLoop {
   void stop();
 
   /// Connections turned away since the start. Thread: any.
-  [[nodiscard]] std::uint64_t refused() const { return refused_.load(std::memory_order_relaxed); }
+  [[nodiscard]] std::uint64_t refused() const { return tally_.refused.load(std::memory_order_relaxed); }
   /// Of each of its addresses. Between start() and stop(). Thread: that of these.
   [[nodiscard]] std::vector<std::shared_ptr<Knock>> knocks() const;
   /// When the loop last came round, or was made. Thread: any.
@@ -79,6 +78,16 @@ class AcceptLoop {
     void enter(Phase next, TimePoint now) { phase = next, since = now; }
   };
   using Phase = Connection::Phase;
+  /// How often traffic is counted, and when it was last.
+  struct Counting {
+    Duration every{};
+    TimePoint last{};
+  };
+  /// Since the start.
+  struct Tally {
+    std::uint64_t cut_off = 0, gave_way = 0;
+    std::atomic<std::uint64_t> refused{0};
+  };
   void run();
   /// False: nothing could be accepted, and trying again at once would spin.
   bool accept_one(const Entry& entry);
@@ -114,16 +123,11 @@ class AcceptLoop {
   InProgress in_progress_;
   std::map<PeerBudgets::Id, Connection> connections_;
   PeerBudgets::Id last_id_ = 0;
-  MemoryTrimmer trimmer_;
-  std::optional<TrimPlan> trims_;
-  TimePoint counted_{}, looked_{};
-  Duration count_every_{};
-  std::size_t memory_limit_ = 0;  ///< bytes
+  MemoryKeeper memory_;
+  Counting counting_;
   Duration leaving_{};
   std::int64_t streams_of_one_ = 0;
-  std::int64_t streams_gone_ = 0;  ///< of those that have left, since memory was looked after for it
-  std::uint64_t cut_off_ = 0, gave_way_ = 0;
-  std::atomic<std::uint64_t> refused_{0};
+  Tally tally_;
   std::atomic<TimePoint> progress_{monotonic_now()};
   std::atomic<bool> stopping_{false};
   std::thread thread_;

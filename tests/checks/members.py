@@ -10,7 +10,6 @@ import tree
 MOST = 20
 # At most so many: these are to be taken apart.
 KNOWN = {
-    ("api/transport/accept_loop.hpp", "AcceptLoop"): 27,
     ("api/web/gateway/connection.hpp", "Connection"): 21,
     ("buses/modbus_rtu/rtu_bus.hpp", "RtuBus"): 27,
     ("daemon/store/journal_file.hpp", "JournalFile"): 21,
