@@ -60,14 +60,14 @@ void Connection::close() {
   if (phase_ == Phase::closed) return;
   phase_ = Phase::closed;
   deadline_.reset();
-  if (auto call = std::exchange(call_, nullptr)) {
+  if (auto call = std::exchange(passing_.call, nullptr)) {
     // A page that has left wanted none the less that it stops.
-    if (stopping_)
-      call->leave([place = std::make_shared<std::optional<Shares::Place>>(std::move(stream_))] {});
+    if (passing_.stops)
+      call->leave([place = std::make_shared<std::optional<Shares::Place>>(std::move(passing_.stream))] {});
     else
       call->cancel();
   }
-  stream_.reset();
+  passing_.stream.reset();
   acting_ = false;
   transport_.close();
   place_.reset();
@@ -268,8 +268,8 @@ void Connection::begin_call() {
   if (const auto objected = objection_to_call()) return refuse(*objected);
   if (!identify(true))
     return refuse(refused_call(401, {.code = code::unauthenticated, .message = "nobody is logged in"}));
-  daemon_ = gateway_.machine(header(machine_header));
-  if (daemon_ == nullptr)
+  passing_.daemon = gateway_.machine(header(machine_header));
+  if (passing_.daemon == nullptr)
     return refuse(refused_call(404, {.code = code::not_found, .message = "there is no such machine"}));
   const auto target = view(parser_->get().target());
   const auto method = method_of_path(target);
@@ -280,9 +280,9 @@ void Connection::begin_call() {
     return refuse(
         failed_call({.code = code::failed_precondition,
                      .message = fmt::format("{} goes over the lane", target.substr(target.rfind('/') + 1))}));
-  stopping_ = kind == LaneKind::stop;
-  stream_ = (stopping_ ? gateway_.stops : gateway_.streams).take(known_.person.key());
-  if (!stream_)
+  passing_.stops = kind == LaneKind::stop;
+  passing_.stream = (passing_.stops ? gateway_.stops : gateway_.streams).take(known_.person.key());
+  if (!passing_.stream)
     return refuse(refused_call(
         429, {.code = code::resource_exhausted, .message = "too many calls of this person are open"}));
   acting_ = true;
@@ -292,15 +292,15 @@ void Connection::begin_call() {
 void Connection::start_call() {
   const auto message = message_of(parser_->get().body());
   if (!message) {
-    stream_.reset();
+    passing_.stream.reset();
     acting_ = false;
     return answer(refused_call(400, message.error()));
   }
   head_sent_ = false;
   auto timeout = grpc_text::timeout_of(header("grpc-timeout"));
-  if (stopping_)
+  if (passing_.stops)
     timeout = std::min<Duration>(timeout.value_or(Duration::max()), LaneState::patience_of_stops);
-  call_ = daemon_->start(
+  passing_.call = passing_.daemon->start(
       std::string(view(parser_->get().target())), *message, known_.person, timeout,
       {.message = [self = shared_from_this()](const grpc::ByteBuffer& part) { self->pass_on(part); },
        .done = [self = shared_from_this()](const CallStatus& status) { self->end_call(status); }});
@@ -318,13 +318,13 @@ void Connection::pass_on(const grpc::ByteBuffer& message) {
   bytes += "\r\n";
   // The next one only when this one is on its way: whoever takes them slowly gets the newest.
   write(std::move(bytes), [this] {
-    if (call_) call_->next();
+    if (passing_.call) passing_.call->next();
   });
 }
 
 void Connection::end_call(const CallStatus& status) {
-  call_.reset();
-  stream_.reset();
+  passing_.call.reset();
+  passing_.stream.reset();
   acting_ = false;
   std::string bytes;
   if (!std::exchange(head_sent_, true)) bytes = head_of(200, grpc_web_type, std::nullopt, {}, keep_alive_);
@@ -348,7 +348,7 @@ void Connection::answer(const Answer& said) {
 void Connection::refuse(const Answer& said) {
   phase_ = Phase::working;
   since_ = gateway_.clock.now();
-  stream_.reset();
+  passing_.stream.reset();
   acting_ = false;
   write(to_bytes(said, false), [this] { end_gently(); });
 }

@@ -41,6 +41,13 @@ class Connection final : public Guest, public std::enable_shared_from_this<Conne
  private:
   enum class Phase : std::uint8_t { handshake, waiting, reading, working, ending, closed };
   using Error = boost::system::error_code;
+  /// A call that is passed on.
+  struct Passing {
+    bool stops = false;
+    Upstream* daemon = nullptr;  ///< whom it is for
+    std::shared_ptr<Call> call{};
+    std::optional<Shares::Place> stream{};
+  };
 
   // Reading.
   void wait_for_request();
@@ -101,11 +108,8 @@ class Connection final : public Guest, public std::enable_shared_from_this<Conne
   std::optional<RequestParser> parser_;
   bool watching_ = false, keep_alive_ = false, head_sent_ = false, ever_known_ = false;
   Known known_{};
-  bool acting_ = false;         ///< a call is read or carried out
-  bool stopping_ = false;       ///< which is a stop
-  Upstream* daemon_ = nullptr;  ///< whom the call is for
-  std::shared_ptr<Call> call_;
-  std::optional<Shares::Place> stream_;
+  bool acting_ = false;  ///< a call is read or carried out
+  Passing passing_;      ///< which it is
   std::string out_;
 };
 
