@@ -195,7 +195,7 @@ void JournalFile::commit(std::vector<Pending> batch) {
   }
   if (!written) return tell(written.error());
   if (was_broken) tell(std::nullopt);
-  if (size_ < std::max(smallest_rewrite, 2 * size_when_rewritten_)) return;
+  if (size_.now < std::max(smallest_rewrite, 2 * size_.when_rewritten)) return;
   if (const auto shortened = settle(); !shortened) {
     broken_ = true;
     tell(shortened.error());
@@ -254,7 +254,7 @@ Result<void> JournalFile::append(const std::vector<Pending>& batch) {
   }
   for (const auto& pending : batch) text += numbered(pending.line);
   if (auto appended = disk_->append(text); !appended) return appended;
-  size_ += text.size();
+  size_.now += text.size();
   return {};
 }
 
@@ -285,7 +285,7 @@ Result<void> JournalFile::rewrite() {
   for (const auto& line : model_.lines()) text += numbered(line);
   if (auto replaced = disk_->replace(text); !replaced) return replaced;
   all_is_synced();
-  size_ = size_when_rewritten_ = text.size();
+  size_ = {.now = text.size(), .when_rewritten = text.size()};
   return {};
 }
 

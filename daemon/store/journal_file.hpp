@@ -86,6 +86,10 @@ class JournalFile final : public CommandJournal, public StateWitness {
     Callback done{};
     std::promise<Result<void>>* told = nullptr;  ///< waits for it, on a thread of its own
   };
+  /// Of the file, bytes.
+  struct Size {
+    std::size_t now = 0, when_rewritten = 0;
+  };
   JournalFile(std::unique_ptr<JournalDisk> disk, Executor core, JournalOptions options);
   [[nodiscard]] Result<void> load(JournalLoad found, WallTime now);
   void look_at_clock();
@@ -118,7 +122,7 @@ class JournalFile final : public CommandJournal, public StateWitness {
   std::optional<Duration> told_time_;  ///< the last one that was written
   std::uint64_t last_number_ = 0, last_fact_ = 0;
   std::atomic<std::uint64_t> durable_line_ = 0, durable_fact_ = 0;
-  std::size_t size_ = 0, size_when_rewritten_ = 0;  ///< of the file, bytes
+  Size size_;
   bool broken_ = false;               ///< the last write failed: what the file ends with is not known
   std::optional<TimePoint> sync_by_;  ///< something was written that is durable `soon`
 

@@ -11,7 +11,6 @@ MOST = 20
 # At most so many: these are to be taken apart.
 KNOWN = {
     ("buses/modbus_rtu/rtu_bus.hpp", "RtuBus"): 27,
-    ("daemon/store/journal_file.hpp", "JournalFile"): 21,
     ("devices/cia402_eds/simulator.hpp", "StandardDrive"): 43,
     ("devices/yako_rtu/simulator.hpp", "SimulatedDrive"): 36,
     ("devices/yss_c/simulator.hpp", "SimulatedDrive"): 38,
