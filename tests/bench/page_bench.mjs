@@ -1,5 +1,5 @@
 // The page of axisd-web in Chromium, before a real gateway and daemon: README.md says what is measured.
-//   node tests/bench/page_bench.mjs BUILD [stop|all|slow|pages|heap [NUMBER [TIMES]]]        (default: all but heap)
+//   node tests/bench/page_bench.mjs BUILD [stop|all|slow|pages|bad|heap [NUMBER [TIMES]]]        (default: all but heap)
 import { spawnSync } from 'node:child_process';
 import { join, resolve } from 'node:path';
 import { bundle, page, tree, web } from '../web_page/tools.mjs';
@@ -7,7 +7,7 @@ import { bundle, page, tree, web } from '../web_page/tools.mjs';
 const [build = join(tree, 'build/release'), ...words] = process.argv.slice(2);
 const out = join(resolve(build), 'page_bench');
 await page(join(out, 'page'));
-const [program] = await bundle(['bench', 'hasty_machine'].map((name) => join(tree, `tests/web_page/bench/${name}.ts`)), join(out, 'bench'));
+const [program] = await bundle(['bench', 'hasty_machine', 'bad_input'].map((name) => join(tree, `tests/web_page/bench/${name}.ts`)), join(out, 'bench'));
 const { status } = spawnSync(process.execPath, ['--enable-source-maps', program, ...words], {
   stdio: 'inherit',
   env: {

@@ -1,6 +1,6 @@
 // What the page costs a stop, how old its values are on a slow computer, and whether its memory stays what it was.
-//   node tests/bench/page_bench.mjs BUILD [stop|all|slow|pages|heap [NUMBER [TIMES]]]
-// NUMBER: stops of each kind, of heap minutes; TIMES: as fast goes the time of the page, before a machine that is made up
+//   node tests/bench/page_bench.mjs BUILD [stop|all|slow|pages|bad|heap [NUMBER [TIMES]]]
+// NUMBER: stops of each kind, of heap minutes, of bad one of its kinds; TIMES: as fast goes the time of the page, before a machine that is made up
 import { createRequire } from 'node:module';
 import { once } from 'node:events';
 import { Worker } from 'node:worker_threads';
@@ -8,6 +8,7 @@ import type { Browser, CDPSession, Page } from 'playwright-core';
 import { fromBinary } from '@bufbuild/protobuf';
 import { WatchAxesResponseSchema } from '@proto/axis_service_pb';
 import { CHROMIUM, manyAxes, sleep, Stack, until } from '../real/stack';
+import { badInput } from './bad';
 import { hurry, type Haste } from './haste';
 import { costOfPages } from './pages';
 
@@ -187,4 +188,5 @@ if (what === '' || what === 'stop') await stopOfEight();
 if (what === '' || what === 'all') await stopOfAll();
 if (what === '' || what === 'slow') await slow();
 if (what === '' || what === 'pages') await costOfPages();
+if (what === '' || what === 'bad') await badInput(number);
 if (what === 'heap') await (times === '' ? heap(Number(number || '20')) : heapInHaste(Number(number), Number(times)));
