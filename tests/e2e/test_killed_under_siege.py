@@ -1,5 +1,6 @@
-"""SIGKILL of the daemon while its axes turn and clients misbehave: what the service starts then stops every one of them, and
-nothing moves any more. How long that takes is measured by tests/bench/siege_bench.py --kill."""
+"""SIGKILL and SIGTERM of the daemon while its axes turn and clients misbehave: every one of them is stopped, by what the
+service starts then or by the daemon itself, and nothing moves any more. How long that takes is measured by
+tests/bench/siege_bench.py."""
 import contextlib
 import random
 import socket
@@ -7,7 +8,7 @@ import threading
 import time
 import unittest
 
-from harness import START, STARTED, STOP, Scenario, spinner
+from harness import START, STARTED, STOP, Scenario, axis_pb, spinner
 
 AXES = 8
 PREFACE = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n" + bytes([0, 0, 0, 4, 0, 0, 0, 0, 0])
@@ -50,13 +51,19 @@ def silence(peer):
     peer.recv(1)
 
 
-class KilledUnderSiege(Scenario):
-    def test_every_axis_is_told_to_stop_and_nothing_starts(self):
-        axes = {f"axis-{node}": spinner(node) for node in range(1, AXES + 1)}
-        machine = self.machine(axes).start()
-        for axis in axes:
+class UnderSiege(Scenario):
+    @contextlib.contextmanager
+    def besieged(self):
+        """A machine all of whose axes turn, and clients that misbehave at both of its addresses."""
+        self.axes = {f"axis-{node}": spinner(node) for node in range(1, AXES + 1)}
+        machine = self.machine(self.axes).start()
+        for axis in self.axes:
             machine.client.to_done("Enable", axis)
             machine.client.motion("MoveVelocity", axis, velocity=2.0, wait=STARTED)
+        reader = machine.connect()
+        streams = [reader.axis.WatchAxes(axis_pb.WatchAxesRequest()) for _ in range(8)]
+        for stream in streams:  # which nobody reads from then on
+            next(stream)
         besiegers = [Besieger(path, attack) for path in (machine.socket, machine.socket + ".stop")
                      for attack in (pings, garbage, silence)]
         try:
@@ -64,23 +71,38 @@ class KilledUnderSiege(Scenario):
                 time.sleep(0.005)
             for node in range(1, AXES + 1):
                 self.assertTrue(machine.sim.shaft(node).moving, node)
-            killed = time.monotonic_ns()
-            machine.daemon.kill()
-            done = machine.quiesce()
+            yield machine
         finally:
             for each in besiegers:
                 each.close()
-        self.assertEqual((done.returncode, done.stderr), (0, ""), done)
-        self.assertEqual(sorted(done.stdout.splitlines()), [f"{axis}: standstill confirmed" for axis in sorted(axes)])
+
+    def stopped_for_good(self, machine, since):
+        """By nothing but stops without a ramp of their own; nor does the next start move anything."""
         for node in range(1, AXES + 1):
             self.assertFalse(machine.sim.shaft(node).moving, node)
-            writes = machine.sim.wire.writes(node=node, since=killed)
+            writes = machine.sim.wire.writes(node=node, since=since)
             self.assertTrue(writes and all(frame.writes(STOP, 0) for frame in writes), [str(frame) for frame in writes])
-        # Nor does the next start move anything.
         machine.start_daemon()
-        for axis in axes:
+        for axis in self.axes:
             machine.client.wait_online(axis)
-        self.assertEqual(machine.sim.wire.writes(START, since=killed), [])
+        self.assertEqual(machine.sim.wire.writes(START, since=since), [])
+
+    def test_killed_every_axis_is_told_to_stop_and_nothing_starts(self):
+        with self.besieged() as machine:
+            killed = time.monotonic_ns()
+            machine.daemon.kill()
+            done = machine.quiesce()
+        self.assertEqual((done.returncode, done.stderr), (0, ""), done)
+        self.assertEqual(sorted(done.stdout.splitlines()), [f"{axis}: standstill confirmed" for axis in sorted(self.axes)])
+        self.stopped_for_good(machine, killed)
+
+    def test_told_to_end_it_stops_every_axis_and_ends_in_order(self):
+        with self.besieged() as machine:
+            told = time.monotonic_ns()
+            self.assertEqual(machine.daemon.terminate(), 0)
+        self.assertRegex(machine.daemon.log(), r"(?s) info ending: SIGTERM\n.* info ended with status 0\n\Z")
+        self.assertNotIn("sequences did not end", machine.daemon.log())
+        self.stopped_for_good(machine, told)
 
 
 if __name__ == "__main__":
