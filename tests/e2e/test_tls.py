@@ -1,6 +1,8 @@
 """Mutual TLS, and no plaintext beyond this host."""
+import contextlib
 import pathlib
 import re
+import socket
 import unittest
 
 import grpc
@@ -56,6 +58,21 @@ class MutualTls(Scenario):
         done = run([*words, "state", "feeder"])
         self.assertEqual(done.returncode, 3, done.stderr)
         self.assertRegex(done.stderr, r"\Aaxisctl: [^\n]+\n\Z")
+
+    def test_strangers_do_not_fill_the_log(self):
+        self.subject.start_lines()
+        daemon = self.subject.start_daemon()
+        port = wait_for(lambda: re.search(r"serves 'e2e' on port (\d+)", daemon.log()), "the port's number")[1]
+        lane = wait_for(lambda: re.search(r"stops are taken on port (\d+)", daemon.log()), "that of stops")[1]
+        before = len(daemon.log().splitlines())
+        for number in (port, lane):
+            for _ in range(300):
+                with contextlib.suppress(OSError), socket.create_connection(("127.0.0.1", int(number)), timeout=1) as stranger:
+                    stranger.sendall(b"no handshake of TLS" * 20)
+                    stranger.recv(1)  # until it is heard, or cut off
+        wait_for(lambda: re.search(r" more like this in the last 10 s\n", daemon.log()), "the others are counted")
+        wait_for(lambda: re.search(r"connections ended before anybody was identified", daemon.log()), "those of the lane, too")
+        self.assertLess(len(daemon.log().splitlines()) - before, 150, daemon.log())
 
     def refused_files(self, *findings, start=2):
         """Nobody starts with such files, nor calls them right: one line each, at its key. `start`: how a start ends."""
