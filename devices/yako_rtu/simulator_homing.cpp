@@ -1,152 +1,134 @@
-// Homing of the simulated drive, manual 7.5: search, decelerate, leave the switch, approach it slowly.
-#include <cstdlib>
-
-#include "devices/yako_rtu/simulator.hpp"
+#include "devices/yako_rtu/simulator_homing.hpp"
 
 namespace axisd::yako_rtu {
 
-Input SimulatedDrive::homing_reference() const {
-  const auto mode = memory_.get(reg::homing_mode);
+Input Homing::reference() const {
+  const auto mode = memory_->get(reg::homing_mode);
   return mode == 2 ? Input::positive_limit : mode == 3 ? Input::negative_limit : Input::home;
 }
 
 /// Mode 1 ends forwards on some models (7.5): its search passes the switch, the slow approach comes back to
 /// it.
-bool SimulatedDrive::homing_ends_forwards() const {
-  return memory_.get(reg::homing_mode) == 1 &&
-         model_->homing_mode_1_ends_forwards != behaviour_.homing_mode_1_other_approach;
+bool Homing::ends_forwards() const {
+  return memory_->get(reg::homing_mode) == 1 &&
+         model_->homing_mode_1_ends_forwards != behaviour_->homing_mode_1_other_approach;
 }
 
-int SimulatedDrive::approach_direction() const { return homing_ends_forwards() ? 1 : homing_.direction; }
+int Homing::approach_direction() const { return ends_forwards() ? 1 : direction_; }
 
-void SimulatedDrive::homing_run(int direction, double rpm) {
-  const double time = memory_.get(reg::homing_time);
-  motor_.run(direction, rates(rpm, time, time));
+/// `speed`: the register that holds it.
+void Homing::run(int direction, std::uint16_t speed) {
+  const double time = memory_->get(reg::homing_time);
+  motor_->run(direction, memory_->rates(memory_->get(speed), time, time));
 }
 
-Fail SimulatedDrive::start_homing() {
-  if (!enabled() || alarm_ != 0) return refusal();
-  if (control_mode_ != 0) return Fail::none;
-  if (motor_.moving()) return behaviour_.start_in_motion_refused ? Fail::access : Fail::none;
-  if (!behaviour_.stop_terminal_only_edge &&
-      (terminals_.active(Input::stop) || terminals_.active(Input::emergency_stop)))
-    return Fail::none;
-  if (starts_later({.activity = Activity::homing})) return Fail::none;
-  ++starts_;
-  begin_homing();
-  return Fail::none;
-}
-
-void SimulatedDrive::begin_homing() {
-  activity_ = last_activity_ = Activity::homing;
-  homing_due_ = TimePoint::max();
-  in_position_ = stopping_ = false;
-  if (!behaviour_.homed_stays_during_homing) homed_ = false;
-  homing_.direction = memory_.get(reg::homing_mode) % 2 == 0 ? 1 : -1;
-  homing_.turns = 0;
-  if (behaviour_.homing_accepts_active_switch && terminals_.active(homing_reference())) {
-    phase_ = Phase::back_off;
-    homing_run(-approach_direction(), memory_.get(reg::homing_search_speed));
-    return;
-  }
+void Homing::search(int direction) {
+  direction_ = direction;
   phase_ = Phase::search;
-  homing_run(homing_.direction, memory_.get(reg::homing_speed));
+  run(direction, reg::homing_speed);
 }
 
-void SimulatedDrive::homing_edge(const InputEdge& edge) {
-  if (activity_ != Activity::homing || edge.function != homing_reference()) return;
+void Homing::back_off(int direction, std::uint16_t speed) {
+  phase_ = Phase::back_off;
+  run(direction, speed);
+}
+
+void Homing::approach() {
+  phase_ = Phase::approach;
+  run(approach_direction(), reg::homing_search_speed);
+}
+
+void Homing::begin() {
+  due_ = TimePoint::max();
+  if (!behaviour_->homed_stays_during_homing) homed_ = false;
+  direction_ = memory_->get(reg::homing_mode) % 2 == 0 ? 1 : -1;
+  turns_ = 0;
+  if (behaviour_->homing_accepts_active_switch && terminals_->active(reference()))
+    back_off(-approach_direction(), reg::homing_search_speed);
+  else
+    search(direction_);
+}
+
+bool Homing::on_edge(const InputEdge& edge, TimePoint now) {
+  if (edge.function != reference()) return false;
   if (phase_ == Phase::search && edge.rising) {
     phase_ = Phase::found;
-    motor_.brake();
+    motor_->brake();
   } else if (phase_ == Phase::back_off && !edge.rising) {
     phase_ = Phase::left;
-    motor_.brake();
-  } else if (phase_ == Phase::approach && (edge.rising || behaviour_.homing_mode_1_either_edge)) {
-    motor_.stop(false);  // slow enough to stop at once, on the pulse
-    homing_reached();
+    motor_->brake();
+  } else if (phase_ == Phase::approach && (edge.rising || behaviour_->homing_mode_1_either_edge)) {
+    motor_->stop(false);  // slow enough to stop at once, on the pulse
+    return compensate(now);
   }
+  return false;
 }
 
 /// 7.5: "if the limit signal is encountered, the motor will reverse". In modes 2 and 3 the limit ahead is the
 /// goal.
-void SimulatedDrive::homing_limits() {
-  const int direction = motor_.direction();
-  const auto ahead = direction > 0 ? Input::positive_limit : Input::negative_limit;
-  if (!terminals_.active(ahead) || ahead == homing_reference()) return;
-  const bool goes_on = phase_ == Phase::back_off && homing_.turns > 0 && behaviour_.homing_never_gives_up;
+bool Homing::ends_at_limit() {
+  const auto ahead = motor_->direction() > 0 ? Input::positive_limit : Input::negative_limit;
+  if (!terminals_->active(ahead) || ahead == reference()) return false;
+  const bool goes_on = phase_ == Phase::back_off && turns_ > 0 && behaviour_->homing_never_gives_up;
   if (phase_ == Phase::search || goes_on) {
     phase_ = Phase::turn;
-    motor_.brake();
-  } else if (phase_ == Phase::back_off || phase_ == Phase::approach) {
-    cut();
+    motor_->brake();
+    return false;
   }
+  return phase_ == Phase::back_off || phase_ == Phase::approach;
 }
 
-void SimulatedDrive::approach() {
-  phase_ = Phase::approach;
-  homing_run(approach_direction(), memory_.get(reg::homing_search_speed));
-}
-
-void SimulatedDrive::homing_stopped() {
+bool Homing::on_stopped(TimePoint now) {
   const bool turns = phase_ == Phase::turn || phase_ == Phase::found || phase_ == Phase::left;
-  if (behaviour_.homing_pauses && turns && homing_due_ == TimePoint::max()) {
-    homing_due_ = now_ + std::chrono::milliseconds(100);
-    return;
+  if (behaviour_->homing_pauses && turns && !pauses()) {
+    due_ = now + std::chrono::milliseconds(100);
+    return false;
   }
-  homing_due_ = TimePoint::max();
+  due_ = TimePoint::max();
   switch (phase_) {
     case Phase::turn:
-      if (++homing_.turns > 1 && !behaviour_.homing_never_gives_up) {
-        finish();
-        break;
-      }
-      if (behaviour_.homing_same_edge && !homing_ends_forwards() && homing_.turns % 2 == 1) {
-        phase_ =
-            Phase::back_off;  // through the switch, until it has been left on the side where the search began
-        homing_run(-homing_.direction, memory_.get(reg::homing_speed));
-        break;
-      }
-      if (!behaviour_.homing_same_edge || homing_ends_forwards()) homing_.direction = -homing_.direction;
-      phase_ = Phase::search;
-      homing_run(homing_.direction, memory_.get(reg::homing_speed));
-      break;
+      return turn_round();
     case Phase::found:
-      if (homing_.direction != approach_direction() &&
-          (!terminals_.active(Input::home) || behaviour_.homing_mode_1_either_edge)) {
+      if (direction_ != approach_direction() &&
+          (!terminals_->active(Input::home) || behaviour_->homing_mode_1_either_edge))
         approach();
-        break;
-      }
-      phase_ = Phase::back_off;
-      homing_run(
-          -approach_direction(),
-          memory_.get(behaviour_.back_off_at_homing_speed ? reg::homing_speed : reg::homing_search_speed));
-      break;
+      else
+        back_off(-approach_direction(),
+                 behaviour_->back_off_at_homing_speed ? reg::homing_speed : reg::homing_search_speed);
+      return false;
     case Phase::left:
       approach();
-      break;
+      return false;
     case Phase::compensate:
-      if (!behaviour_.zero_before_compensation) clear_counter();
+      if (!behaviour_->zero_before_compensation) position_->clear();
       homed_ = true;
-      finish();
-      break;
+      return true;
     default:  // stopped on the way: not homed
-      finish();
-      break;
+      return true;
   }
+}
+
+bool Homing::turn_round() {
+  if (++turns_ > 1 && !behaviour_->homing_never_gives_up) return true;
+  const bool same_edge = behaviour_->homing_same_edge && !ends_forwards();
+  if (same_edge && turns_ % 2 == 1)
+    // Through the switch, until it has been left on the side where the search began.
+    back_off(-direction_, reg::homing_speed);
+  else
+    search(same_edge ? direction_ : -direction_);
+  return false;
 }
 
 /// On the switch: the compensation 0x0035 (forwards) and 0x0036 (backwards) follows, then the origin is set.
-void SimulatedDrive::homing_reached() {
+bool Homing::compensate(TimePoint now) {
   phase_ = Phase::compensate;
-  clear_counter();
-  const auto offset = static_cast<std::int64_t>(memory_.get(reg::homing_positive_offset)) -
-                      static_cast<std::int64_t>(memory_.get(reg::homing_negative_offset));
-  if (offset == 0) {
-    homing_stopped();
-    return;
-  }
-  const double time = memory_.get(reg::homing_time);
-  motor_.move(offset, rates(memory_.get(reg::homing_search_speed), time, time));
+  position_->clear();
+  const auto offset = static_cast<std::int64_t>(memory_->get(reg::homing_positive_offset)) -
+                      static_cast<std::int64_t>(memory_->get(reg::homing_negative_offset));
+  if (offset == 0) return on_stopped(now);
+  const double time = memory_->get(reg::homing_time);
+  motor_->move(offset, memory_->rates(memory_->get(reg::homing_search_speed), time, time));
+  return false;
 }
 
 }  // namespace axisd::yako_rtu

@@ -1,5 +1,7 @@
 #include "devices/yako_rtu/simulator_memory.hpp"
 
+#include <algorithm>
+
 namespace axisd::yako_rtu {
 
 namespace {
@@ -77,6 +79,13 @@ std::int32_t Memory::get_long(std::uint16_t high, std::uint16_t low) const {
 
 int Memory::pulses_per_revolution() const {
   return model_->pulses_per_revolution.at(get(reg::microstep) & 0x0FU);
+}
+
+simulation::Rates Memory::rates(double rpm, double acceleration_ms, double deceleration_ms) const {
+  const double pulses = pulses_per_revolution();
+  const double fastest = std::min(3000.0, 12e6 / pulses);  // 0x0023: 200 kHz of pulses
+  return simulation::rates_from(get(reg::start_speed), std::min(rpm, fastest), acceleration_ms,
+                                deceleration_ms, pulses);
 }
 
 bool Memory::goes_to_eeprom(std::uint16_t address) const {

@@ -5,6 +5,7 @@
 #include <map>
 #include <vector>
 
+#include "devices/simulation/profile.hpp"
 #include "devices/yako_rtu/registers.hpp"
 #include "devices/yako_rtu/simulator_model.hpp"
 #include "devices/yako_rtu/simulator_switches.hpp"
@@ -46,6 +47,8 @@ class Memory {
   /// A signed 32-bit number in two words that need not be neighbours.
   [[nodiscard]] std::int32_t get_long(std::uint16_t high, std::uint16_t low) const;
   [[nodiscard]] int pulses_per_revolution() const;
+  /// Of a motion with the start speed that is set now.
+  [[nodiscard]] simulation::Rates rates(double rpm, double acceleration_ms, double deceleration_ms) const;
 
   /// A write over the bus: RW/S goes to EEPROM as well while 0x0016 = 0.
   void write(std::uint16_t address, std::uint16_t value);

@@ -1,6 +1,4 @@
 // Frames of the simulated drive, manual 6.2.
-#include <utility>
-
 #include "devices/simulation/crc.hpp"
 #include "devices/yako_rtu/simulator.hpp"
 
@@ -17,11 +15,6 @@ void append_word(std::vector<std::uint8_t>& frame, std::uint16_t value) {
   frame.push_back(static_cast<std::uint8_t>(value & 0xFFU));
 }
 
-/// Where it was read longer ago the carry was not in between.
-constexpr auto just_now = std::chrono::milliseconds(250);
-/// Nor where it was longer ago than a drive takes from one word to the next: pulses, of 200 kHz in 1 ms.
-constexpr int near_carry = 200;
-
 constexpr std::uint8_t read_registers = 0x03, write_register = 0x06, write_registers = 0x10;
 
 /// Does the number of bytes fit the function? What does not is line noise, not a request.
@@ -34,9 +27,9 @@ bool has_right_size(std::span<const std::uint8_t> frame) {
 }  // namespace
 
 std::optional<std::vector<std::uint8_t>> SimulatedDrive::on_frame(std::span<const std::uint8_t> frame) {
-  if (!ready() || frame.size() < 4 || frame[0] != node_ || node_ == 0) return std::nullopt;
+  if (!ready() || frame.size() < 4 || frame[0] != address() || address() == 0) return std::nullopt;
   const auto function = frame[1];
-  std::vector<std::uint8_t> reply{node_, function};
+  std::vector<std::uint8_t> reply{address(), function};
   auto fail = Fail::none;
   if (!simulation::frame_is_sound(frame)) {
     if (!behaviour_.crc_error_answered) return std::nullopt;
@@ -53,18 +46,9 @@ std::optional<std::vector<std::uint8_t>> SimulatedDrive::on_frame(std::span<cons
     fail = behaviour_.function_error_code_1 ? Fail::crc : Fail::function;
   }
   if (fail != Fail::none)
-    reply = {node_, static_cast<std::uint8_t>(function | 0x80U), static_cast<std::uint8_t>(fail)};
+    reply = {address(), static_cast<std::uint8_t>(function | 0x80U), static_cast<std::uint8_t>(fail)};
   simulation::append_frame_crc(reply);
   return reply;
-}
-
-std::uint16_t SimulatedDrive::read_position_high() {
-  const auto high = static_cast<std::uint16_t>(peek(reg::position_high));
-  const auto before = std::exchange(position_high_read_, std::pair(high, now_));
-  const auto low = static_cast<std::int16_t>(peek(reg::position_low));
-  const bool carries = -near_carry <= low && low < near_carry;
-  const bool torn = behaviour_.position_words_torn && carries && before && now_ - before->second <= just_now;
-  return torn ? before->first : high;
 }
 
 Fail SimulatedDrive::read(std::span<const std::uint8_t> frame, std::vector<std::uint8_t>& reply) {
@@ -74,7 +58,7 @@ Fail SimulatedDrive::read(std::span<const std::uint8_t> frame, std::vector<std::
   reply.push_back(static_cast<std::uint8_t>(2 * count));
   for (std::uint16_t i = 0; i < count; ++i) {
     const auto address = static_cast<std::uint16_t>(first + i);
-    append_word(reply, address == reg::position_high ? read_position_high()
+    append_word(reply, address == reg::position_high ? position_words_.read_high(position(), now_)
                                                      : static_cast<std::uint16_t>(peek(address)));
   }
   return Fail::none;
@@ -133,11 +117,11 @@ Fail SimulatedDrive::execute(std::uint16_t address, std::uint16_t value) {
       configuration_changed();
       return Fail::none;
     case reg::position_clear:
-      if (value != 1 || (motor_.moving() && !behaviour_.position_clear_in_motion)) return Fail::none;
+      if (value != 1 || (motor().moving() && !behaviour_.position_clear_in_motion)) return Fail::none;
       if (behaviour_.position_clear_late)
-        clear_due_ = now_ + std::chrono::milliseconds(20);
+        shaft_.clear_at(now_ + std::chrono::milliseconds(20));
       else
-        clear_counter();
+        position_words_.clear();
       return Fail::none;
     case reg::homing_start:
       return value == 1 ? start_homing() : Fail::none;
