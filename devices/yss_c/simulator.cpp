@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "devices/yss_c/simulator_dictionary.hpp"
+#include "devices/yss_c/simulator_rates.hpp"
 
 namespace axisd::yss_c {
 
@@ -20,9 +21,6 @@ constexpr int dip_bauds[] = {1'000'000};  // 4.3, SW2 off
 constexpr std::uint8_t last_dip_address = 15, first_custom_node = 16;
 // 4.3, codes of 2009h.
 constexpr std::array<std::uint32_t, 6> custom_bauds{500'000, 250'000, 125'000, 100'000, 50'000, 25'000};
-// 7, codes of 2006h.
-constexpr std::array<int, 16> microsteps{400,  800,  1600, 3200, 6400, 12800, 25600, 51200,
-                                         1000, 2000, 4000, 5000, 8000, 10000, 20000, 40000};
 /// Resetting the communication reads no EEPROM and tests nothing; the manual gives no figure.
 constexpr Duration communication_reset_time = std::chrono::milliseconds(10);
 
@@ -74,12 +72,14 @@ SimulatedDrive::SimulatedDrive(SimulatedNodeSettings settings)
       server_(server_settings(behaviour_), dictionary_, hooks(),
               [this](bool communication_only) { nmt_reset(communication_only); }),
       inputs_(input_terminals, {input_home, input_positive_limit, input_negative_limit}, settings_),
-      encoder_(settings_.encoder, settings_.address) {
+      shaft_(settings_.encoder, settings_.address),
+      motion_(shaft_.motor()),
+      homing_(behaviour_, dictionary_, inputs_, shaft_.motor()) {
   add_rows(dictionary_, behaviour_, pdos_of(behaviour_));
   for (const auto& [key, value] : settings_.eeprom) dictionary_.preset(key, value);
   if (!settings_.powered) return;
   power_up();
-  boot_end_.reset();
+  supply_.skip_boot();
   server_.boot_quietly(server_.node(), now_);
   settle_inputs();
 }
@@ -94,7 +94,7 @@ void SimulatedDrive::set_up_from_eeprom() {
   const auto node = *settings_.dip_address != 0   ? *settings_.dip_address
                     : custom >= first_custom_node ? custom
                                                   : undefined;
-  server_.boot(node, *boot_end_);
+  server_.boot(node, *supply_.boot_end());
   rest();
 }
 
@@ -111,27 +111,25 @@ void SimulatedDrive::join(std::uint32_t bitrate) {
 }
 
 void SimulatedDrive::power_up() {
-  powered_ = true;
-  boot_end_ = now_ + settings_.boot_time;
-  motor_.power_up();
-  alarm_ = cause_;
-  homed_ = false;
+  supply_.boot(now_ + settings_.boot_time);
+  motor().power_up();
+  alarm_.power_up();
+  homing_.forget();
   set_up_from_eeprom();
   if (settings_.dip_baud) join(0);
 }
 
 /// Nothing runs and nothing waits.
 void SimulatedDrive::rest() {
-  state_ = alarm_ == 0 ? State::disabled : State::fault;
-  control_ = 0;
-  mode_ = 0;
-  energised_ = reached_ = acknowledged_ = stopping_ = homing_error_ = false;
-  activity_ = Activity::none;
-  pending_.reset();
-  suspended_.reset();
-  buffered_.reset();
-  velocity_held_ = false;
-  clear_due_ = homing_due_ = TimePoint::max();
+  control_.reset(alarm_.on() ? PowerState::fault : PowerState::disabled, 0);
+  energised_ = reached_ = false;
+  motion_.rest();
+  set_points_.drop_all();
+  set_points_.end_acknowledgement();
+  velocity_.release();
+  shaft_.forget_clearing();
+  homing_.end_pause();
+  homing_.set_failed(false);
 }
 
 void SimulatedDrive::nmt_reset(bool communication_only) {
@@ -141,23 +139,23 @@ void SimulatedDrive::nmt_reset(bool communication_only) {
     return;
   }
   cut();
-  boot_end_ = now_ + settings_.boot_time;
+  supply_.boot(now_ + settings_.boot_time);
   if (!behaviour_.nmt_reset_keeps_position) {
-    motor_.power_up();
-    homed_ = false;
+    motor().power_up();
+    homing_.forget();
   }
   set_up_from_eeprom();
 }
 
 void SimulatedDrive::set_power(bool on) {
-  if (on == powered_) return;
+  if (on == supply_.on()) return;
   if (on) {
     power_up();
     return;
   }
   cut();
-  powered_ = energised_ = false;
-  boot_end_.reset();
+  energised_ = false;
+  supply_.switch_off();
   server_.switch_off();
 }
 
@@ -168,41 +166,40 @@ void SimulatedDrive::advance(TimePoint now) {
 }
 
 TimePoint SimulatedDrive::next_event() const {
-  if (!powered_) return TimePoint::max();
+  if (!supply_.on()) return TimePoint::max();
   return std::min(motion_event(), server_.next_event());
 }
 
 TimePoint SimulatedDrive::motion_event() const {
-  if (boot_end_) return *boot_end_;
-  auto next = std::min({motor_.ends(), inputs_.next_event(), clear_due_, homing_due_});
-  if (motor_.moving()) {
-    const auto change = inputs_.next_switch(motor_.shaft(), motor_.direction());
-    if (change) next = std::min(next, motor_.reaches(*change));
-    if (in_control()) next = std::min(next, motor_.lags(deviation_limit()));
+  if (const auto end = supply_.boot_end()) return *end;
+  auto next = std::min({motor().ends(), inputs_.next_event(), shaft_.clear_due(), homing_.due()});
+  if (motor().moving()) {
+    const auto change = inputs_.next_switch(motor().shaft(), motor().direction());
+    if (change) next = std::min(next, motor().reaches(*change));
+    if (in_control()) next = std::min(next, motor().lags(deviation_limit()));
   }
   return next;
 }
 
 void SimulatedDrive::step(TimePoint now) {
   now_ = now;
-  const bool ended = motor_.advance(now, in_control());
+  const bool ended = motor().advance(now, in_control());
   follow(now);
-  if (boot_end_ && now >= *boot_end_) {
-    boot_end_.reset();
+  if (supply_.booted(now)) {
     server_.advance(now);  // the boot-up message comes before an alarm's
     settle_inputs();
-    if (alarm_ != 0) report_alarm();
+    if (alarm_.on()) report_alarm();
   }
   if (ready()) {
-    for (const auto& edge : inputs_.sample(now, motor_.shaft(), input_settings())) on_edge(edge);
-    if (motor_.moving() && !energised()) cut();
-    if (in_control() && std::llabs(motor_.lag()) >= deviation_limit()) show_alarm(5);
+    for (const auto& edge : inputs_.sample(now, motor().shaft(), input_settings())) on_edge(edge);
+    if (motor().moving() && !energised()) cut();
+    if (in_control() && std::llabs(motor().lag()) >= deviation_limit()) show_alarm(5);
     enforce_limits();
-    if (ended && !motor_.moving()) on_stopped();
-    if (homing_due_ <= now) homing_stopped();
-    if (clear_due_ <= now) {
-      clear_due_ = TimePoint::max();
-      motor_.clear_counter();
+    if (ended && !motor().moving()) on_stopped();
+    if (homing_.due() <= now && homing_.on_stopped(now)) finish();
+    if (shaft_.clear_due() <= now) {
+      shaft_.forget_clearing();
+      motor().clear_counter();
     }
     update_velocity();
     // Event PDOs look when something changed; what changes with time alone they look at by themselves.
@@ -212,30 +209,33 @@ void SimulatedDrive::step(TimePoint now) {
   server_.advance(now);
 }
 
+simulation::Hold SimulatedDrive::hold() const {
+  return {.in_control = in_control(),
+          .energised = ready() && energised(),
+          .seen = ready() && closed_loop() && !behaviour_.released_position_frozen};
+}
+
 /// What the load and the encoder do meanwhile.
 void SimulatedDrive::follow(TimePoint now) {
-  encoder_.set_resolution(pulses_of_counts(1));
-  motor_.follow_within(closed_loop() ? encoder_.settings().following : Duration{});
-  if (!in_control()) encoder_.relax();
-  const bool held = motor_.blocked() || motor_.moving() || (ready() && energised());
-  if (const auto pulses = encoder_.slipped(now, !held); pulses != 0)
-    motor_.push(pulses, ready() && closed_loop() && !behaviour_.released_position_frozen);
+  shaft_.encoder().set_resolution(pulses_of_counts(1));
+  shaft_.follow(now, hold(), closed_loop() ? shaft_.encoder().settings().following : Duration{});
 }
 
 /// All that can change by itself and shows in mappable objects, but the position.
 std::uint64_t SimulatedDrive::appearance() const {
   return std::uint64_t{status()} | std::uint64_t{inputs_.bits()} << 16U | std::uint64_t{outputs()} << 24U |
-         static_cast<std::uint64_t>(alarm_) << 32U | (motor_.moving() ? std::uint64_t{1} << 40U : 0U) |
-         static_cast<std::uint64_t>(starts_) << 41U;
+         static_cast<std::uint64_t>(alarm_.shown()) << 32U |
+         (motor().moving() ? std::uint64_t{1} << 40U : 0U) |
+         static_cast<std::uint64_t>(motion_.starts()) << 41U;
 }
 
 void SimulatedDrive::on_frame(const can::Frame& frame) {
-  if (!powered_) return;
+  if (!supply_.on()) return;
   server_.on_frame(frame, now_);
   step(now_);
 }
 
-void SimulatedDrive::settle_inputs() { inputs_.settle(motor_.shaft(), input_settings()); }
+void SimulatedDrive::settle_inputs() { inputs_.settle(motor().shaft(), input_settings()); }
 
 void SimulatedDrive::set_input(std::string_view terminal, std::optional<bool> active) {
   inputs_.drive(terminal, active);
@@ -243,37 +243,36 @@ void SimulatedDrive::set_input(std::string_view terminal, std::optional<bool> ac
 }
 
 void SimulatedDrive::block_shaft(bool blocked) {
-  motor_.block(blocked);
+  motor().block(blocked);
   step(now_);
 }
 
 bool SimulatedDrive::run_at(double factor) {
-  motor_.run_at(factor);
+  motor().run_at(factor);
   return true;
 }
 
 bool SimulatedDrive::push_shaft(std::int64_t pulses) {
-  if (motor_.blocked() || (ready() && energised())) return false;
-  motor_.push(pulses, ready() && closed_loop() && !behaviour_.released_position_frozen);
+  if (!shaft_.push(pulses, hold())) return false;
   server_.touch(now_);
   step(now_);
   return true;
 }
 
 bool SimulatedDrive::lean_on_shaft(int counts) {
-  if (!in_control() || !encoder_.lean(counts)) return false;
+  if (!shaft_.lean(counts, hold())) return false;
   server_.touch(now_);
   step(now_);
   return true;
 }
 
 double SimulatedDrive::pulses_of_counts(double counts) const {
-  return counts * pulses_per_revolution() / 4000;
+  return counts * pulses_per_revolution(dictionary_) / 4000;
 }
 
 /// In pulses. 2046h gives no unit: taken as counts of the encoder, so that its default is one revolution.
 std::int64_t SimulatedDrive::deviation_limit() const {
-  return dictionary_.get(0x2046) * pulses_per_revolution() / 4000 + 1;
+  return dictionary_.get(0x2046) * pulses_per_revolution(dictionary_) / 4000 + 1;
 }
 
 /// 204Fh gives no unit: taken as counts of the encoder, as 2046h.
@@ -281,11 +280,7 @@ bool SimulatedDrive::in_position() const {
   if (!reached_ || !closed_loop()) return reached_;
   const auto window =
       static_cast<std::int64_t>(std::ceil(pulses_of_counts(static_cast<double>(dictionary_.get(0x204F)))));
-  return std::llabs(encoder_.deviation(motor_, now_)) <= window;
-}
-
-int SimulatedDrive::pulses_per_revolution() const {
-  return microsteps.at(static_cast<std::size_t>(dictionary_.get(0x2006)) & 15U);
+  return shaft_.within(window, now_);
 }
 
 simulation::InputSettings SimulatedDrive::input_settings() const {
@@ -313,7 +308,7 @@ std::uint16_t SimulatedDrive::shown(std::uint16_t active, std::uint8_t inversion
 
 /// Functions 2030h:0D..0F that are active.
 std::uint16_t SimulatedDrive::outputs() const {
-  const std::array<bool, 5> functions{false, alarm_ != 0, motor_.moving(), homed_, in_position()};
+  const std::array<bool, 5> functions{false, alarm_.on(), motor().moving(), homing_.homed(), in_position()};
   unsigned bits = 0;
   for (unsigned i = 0; i < 3; ++i)
     if (functions.at(static_cast<std::size_t>(dictionary_.get(0x2030, static_cast<std::uint8_t>(0x0D + i)))))

@@ -7,14 +7,26 @@
 #include <span>
 #include <string_view>
 
+#include "devices/simulation/alarm_latch.hpp"
 #include "devices/simulation/canopen_server.hpp"
+#include "devices/simulation/cia402_control.hpp"
 #include "devices/simulation/input_bank.hpp"
-#include "devices/simulation/motor.hpp"
+#include "devices/simulation/motion.hpp"
+#include "devices/simulation/set_points.hpp"
+#include "devices/simulation/shaft.hpp"
 #include "devices/simulation/simulated_node.hpp"
 #include "devices/simulation/simulator.hpp"
+#include "devices/simulation/supply.hpp"
+#include "devices/simulation/velocity_mode.hpp"
+#include "devices/yss_c/simulator_homing.hpp"
+#include "devices/yss_c/simulator_inputs.hpp"
 #include "devices/yss_c/simulator_switches.hpp"
 
 namespace axisd::yss_c {
+
+using simulation::Activity;
+using simulation::Plan;
+using simulation::PowerState;
 
 /// All models of the family are one drive with different motors.
 std::span<const simulation::Simulator> simulators();
@@ -24,6 +36,7 @@ std::span<const simulation::Simulator> simulators();
 class SimulatedDrive final : public simulation::SimulatedCanNode {
  public:
   explicit SimulatedDrive(simulation::SimulatedNodeSettings settings);
+  SimulatedDrive(const SimulatedDrive&) = delete;
 
   [[nodiscard]] std::uint8_t address() const override { return server_.node(); }
   [[nodiscard]] std::optional<std::uint32_t> bitrate() const override { return bitrate_; }
@@ -42,26 +55,15 @@ class SimulatedDrive final : public simulation::SimulatedCanNode {
   bool run_at(double factor) override;
   bool push_shaft(std::int64_t pulses) override;
   bool lean_on_shaft(int counts) override;
-  [[nodiscard]] simulation::Encoder* encoder() override { return &encoder_; }
-  [[nodiscard]] std::int64_t shaft_pulses() const override { return motor_.shaft(); }
-  [[nodiscard]] bool shaft_moving() const override { return motor_.moving() && !motor_.blocked(); }
-  [[nodiscard]] int starts() const override { return starts_; }
+  [[nodiscard]] simulation::Encoder* encoder() override { return &shaft_.encoder(); }
+  [[nodiscard]] std::int64_t shaft_pulses() const override { return motor().shaft(); }
+  [[nodiscard]] bool shaft_moving() const override { return shaft_.turns(); }
+  [[nodiscard]] int starts() const override { return motion_.starts(); }
   [[nodiscard]] std::uint32_t peek(std::uint32_t address) const override;
   void poke(std::uint32_t address, std::uint32_t value) override;
   [[nodiscard]] std::uint64_t eeprom_writes() const override { return dictionary_.eeprom_writes(); }
 
  private:
-  /// CiA 402, 6.2.1. Fault Reaction Active is over at once, and so is Not Ready with the boot.
-  enum class State : std::uint8_t { disabled, ready, switched_on, operation, quick_stop, fault };
-  enum class Activity : std::uint8_t { none, position, velocity, jog, homing };
-  enum class Phase : std::uint8_t { search, turn, found, back_off, left, approach, compensate, ending };
-  /// A motion to begin.
-  struct Plan {
-    Activity activity = Activity::none;
-    std::optional<std::int64_t> target;  ///< shaft position; nothing: endless in `direction`
-    int direction = 1;
-    simulation::Rates rates;
-  };
   /// A target as 6.2.4 hands it over: what the objects held at the edge of bit 4.
   struct SetPoint {
     std::int64_t value = 0;
@@ -70,11 +72,14 @@ class SimulatedDrive final : public simulation::SimulatedCanNode {
   };
 
   // simulator.cpp: power, time, inputs and outputs
+  [[nodiscard]] simulation::Motor& motor() { return shaft_.motor(); }
+  [[nodiscard]] const simulation::Motor& motor() const { return shaft_.motor(); }
   void step(TimePoint now);
   [[nodiscard]] TimePoint motion_event() const;
-  [[nodiscard]] bool ready() const { return powered_ && !boot_end_; }
+  [[nodiscard]] bool ready() const { return supply_.ready(); }
   [[nodiscard]] bool closed_loop() const { return dictionary_.get(0x2007) == 0; }
-  [[nodiscard]] bool in_control() const { return closed_loop() && ready() && energised() && alarm_ == 0; }
+  [[nodiscard]] bool in_control() const { return closed_loop() && ready() && energised() && !alarm_.on(); }
+  [[nodiscard]] simulation::Hold hold() const;
   [[nodiscard]] bool shows_encoder() const { return closed_loop() && !behaviour_.position_is_commanded; }
   void follow(TimePoint now);
   /// Pulses of the motor for so many counts of the encoder.
@@ -82,7 +87,6 @@ class SimulatedDrive final : public simulation::SimulatedCanNode {
   [[nodiscard]] std::int64_t deviation_limit() const;
   /// A motion ended at its target, and the encoder is within 204Fh of it.
   [[nodiscard]] bool in_position() const;
-  [[nodiscard]] int pulses_per_revolution() const;
   [[nodiscard]] simulation::InputSettings input_settings() const;
   [[nodiscard]] std::uint16_t outputs() const;
   [[nodiscard]] std::uint16_t shown(std::uint16_t active, std::uint8_t inversion, std::size_t count) const;
@@ -114,9 +118,7 @@ class SimulatedDrive final : public simulation::SimulatedCanNode {
   void disable_voltage();
   void energise();
   [[nodiscard]] bool energised() const { return energised_ && !inputs_.active(input_release); }
-  [[nodiscard]] bool halted() const { return (control_ & 0x100U) != 0; }
   [[nodiscard]] std::uint16_t status() const;
-  [[nodiscard]] std::uint16_t state_bits() const;
   [[nodiscard]] bool target_reached() const;
   void show_alarm(int code);
   void report_alarm();
@@ -124,7 +126,6 @@ class SimulatedDrive final : public simulation::SimulatedCanNode {
   void reset_fault();
 
   // simulator_motion.cpp: starts and stops
-  [[nodiscard]] simulation::Rates rates(double rpm, double acceleration_ms, double deceleration_ms) const;
   [[nodiscard]] SetPoint set_point(bool relative) const;
   [[nodiscard]] Plan plan_of(const SetPoint& point) const;
   [[nodiscard]] Plan endless_plan(Activity activity, double rpm, int direction) const;
@@ -143,60 +144,28 @@ class SimulatedDrive final : public simulation::SimulatedCanNode {
   [[nodiscard]] bool stop_held() const;
   void enforce_limits();
   [[nodiscard]] bool limit_active(int direction) const;
-
-  // simulator_homing.cpp
   void start_homing();
-  void homing_edge(const simulation::FunctionEdge& edge);
-  void homing_limits();
-  void homing_stopped();
-  void homing_run(int direction, std::uint8_t speed_sub);
-  void homing_reached();
-  void homing_failed();
-  [[nodiscard]] int approach_direction() const;
-
-  // Codes of the input functions (7, 2030h).
-  static constexpr std::uint8_t input_home = 1, input_positive_limit = 2, input_negative_limit = 3,
-                                input_enable = 4, input_release = 5, input_alarm_clear = 6, input_factory = 7,
-                                input_stop = 8, input_stop_at_once = 9, input_position = 10,
-                                input_velocity = 11, input_jog_positive = 12, input_jog_negative = 13,
-                                input_homing = 14;
 
   Behaviour behaviour_;
   simulation::SimulatedNodeSettings settings_;
   simulation::CanopenDictionary dictionary_;
   simulation::CanopenServer server_;
   simulation::InputBank inputs_;
-  simulation::Motor motor_;
-  simulation::Encoder encoder_;
+  simulation::Shaft shaft_;
+  simulation::Supply supply_;
   TimePoint now_{};
   std::optional<std::uint32_t> bitrate_;  ///< since the last power-up; nothing: never joined a network
-  bool powered_ = false;
-  std::optional<TimePoint> boot_end_;
-  TimePoint clear_due_ = TimePoint::max();   ///< 2012h takes effect
-  TimePoint homing_due_ = TimePoint::max();  ///< the next phase of homing begins
-  std::uint64_t appearance_ = 0;             ///< as it was when event PDOs were last told to look
+  std::uint64_t appearance_ = 0;          ///< as it was when event PDOs were last told to look
 
-  State state_ = State::disabled;
-  std::uint16_t control_ = 0;
-  int mode_ = 0;
-  bool energised_ = false, reached_ = false, homed_ = false, homing_error_ = false;
-  bool acknowledged_ = false;  ///< bit 12 of position mode
-  int alarm_ = 0, cause_ = 0;  ///< shown; 2 or 3 while the supply voltage is wrong
-  int starts_ = 0;
+  simulation::Cia402Control control_;  ///< 6.2.1, 6.2.2
+  bool energised_ = false;
+  bool reached_ = false;  ///< a motion ended at its target
+  simulation::AlarmLatch alarm_;
 
-  Activity activity_ = Activity::none;
-  std::optional<Plan> pending_;       ///< begins when the motor has stopped
-  std::optional<Plan> suspended_;     ///< halted, or given while halted
-  std::optional<SetPoint> buffered_;  ///< begins when the one before is reached (bit 5 = 0)
-  std::int64_t last_target_ = 0;      ///< shaft position of the last position move
-  bool stopping_ = false;             ///< the motion will not complete
-  bool velocity_held_ = false;        ///< stopped by something else than 60FFh: needs a new one
-  std::int64_t velocity_ = 0;         ///< signed r/min that velocity mode runs at
-
-  Phase phase_ = Phase::ending;
-  int homing_direction_ = 1, homing_turns_ = 0;
-  std::uint8_t homing_reference_ = input_home;
-  bool homing_ends_forwards_ = false;
+  simulation::Motion motion_;
+  simulation::SetPoints<SetPoint> set_points_;
+  simulation::VelocityMode velocity_;
+  Homing homing_;
 };
 
 }  // namespace axisd::yss_c

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "devices/yss_c/simulator.hpp"
+#include "devices/yss_c/simulator_rates.hpp"
 
 namespace axisd::yss_c {
 
@@ -11,24 +12,25 @@ namespace abort_code = simulation::abort_code;
 using simulation::ObjectRow;
 
 simulation::CanopenHooks SimulatedDrive::hooks() {
-  return {.read = [this](const ObjectRow& row) { return read(row); },
-          .write = [this](const ObjectRow& row, std::int64_t value,
-                          bool& store) { return write(row, value, store); },
-          .written = [this](const ObjectRow& row) { written(row); },
-          .saves = [this](const ObjectRow& row) { return saves(row); },
-          .changing = [this] { return motor_.moving() || (closed_loop() && encoder_.wavers(motor_)); }};
+  return {
+      .read = [this](const ObjectRow& row) { return read(row); },
+      .write = [this](const ObjectRow& row, std::int64_t value,
+                      bool& store) { return write(row, value, store); },
+      .written = [this](const ObjectRow& row) { written(row); },
+      .saves = [this](const ObjectRow& row) { return saves(row); },
+      .changing = [this] { return motor().moving() || (closed_loop() && shaft_.encoder().wavers(motor())); }};
 }
 
 std::int32_t SimulatedDrive::position() const {
-  return shows_encoder() ? encoder_.position(motor_, now_) : motor_.counter();
+  return shows_encoder() ? shaft_.measured(now_) : motor().counter();
 }
 
 /// 2002h: measured, where there is something to measure with.
 std::int64_t SimulatedDrive::velocity_rpm() const {
-  const bool measured = shows_encoder() && motor_.following();
-  const auto speed = measured ? motor_.shaft_speed() : motor_.direction() * motor_.speed();
-  const auto noise = shows_encoder() ? encoder_.velocity_noise(now_) : 0;
-  return std::lround(speed * 60 / pulses_per_revolution()) + noise;
+  const bool measured = shows_encoder() && motor().following();
+  const auto speed = measured ? motor().shaft_speed() : motor().direction() * motor().speed();
+  const auto noise = shows_encoder() ? shaft_.encoder().velocity_noise(now_) : 0;
+  return std::lround(speed * 60 / pulses_per_revolution(dictionary_)) + noise;
 }
 
 std::optional<std::int64_t> SimulatedDrive::read(const ObjectRow& row) const {
@@ -36,7 +38,7 @@ std::optional<std::int64_t> SimulatedDrive::read(const ObjectRow& row) const {
     case 0x2000:
       return server_.node();
     case 0x2001:
-      return motor_.moving() ? 1 : 0;
+      return motor().moving() ? 1 : 0;
     case 0x2002:
       return velocity_rpm();
     case 0x2003:
@@ -44,11 +46,11 @@ std::optional<std::int64_t> SimulatedDrive::read(const ObjectRow& row) const {
     case 0x2004:
       return shown(outputs(), 0x0C, 3);
     case 0x603F:
-      return alarm_ == 0 ? 0 : 0xFF00 + alarm_;
+      return alarm_.on() ? 0xFF00 + alarm_.shown() : 0;
     case 0x6041:
       return status();
     case 0x6061:
-      return mode_;
+      return control_.mode();
     case 0x6064:
       return position();
     default:
@@ -62,10 +64,10 @@ std::uint32_t SimulatedDrive::write(const ObjectRow& row, std::int64_t value, bo
     return command(row.index, value);
   }
   if (row.index == 0x6060 && value != 0 && value != 1 && value != 3 && value != 6) return abort_code::value;
-  if (row.index == 0x60FF) velocity_held_ = false;
+  if (row.index == 0x60FF) velocity_.release();
   if (row.index == 0x6064) {
-    if (motor_.moving()) return abort_code::device_state;
-    motor_.set_counter(static_cast<std::int32_t>(value + (motor_.counter() - position())));
+    if (motor().moving()) return abort_code::device_state;
+    motor().set_counter(static_cast<std::int32_t>(value + (motor().counter() - position())));
     store = false;
   }
   if (row.index != 0x6098) return abort_code::none;
@@ -88,11 +90,11 @@ std::uint32_t SimulatedDrive::command(std::uint16_t index, std::int64_t value) {
       reset_fault();
       break;
     default:  // 2012h
-      if (!motor_.moving() || behaviour_.position_clear_in_motion) {
+      if (!motor().moving() || behaviour_.position_clear_in_motion) {
         if (behaviour_.position_clear_late)
-          clear_due_ = now_ + std::chrono::milliseconds(20);
+          shaft_.clear_at(now_ + std::chrono::milliseconds(20));
         else
-          motor_.clear_counter();
+          motor().clear_counter();
       }
       break;
   }

@@ -12,7 +12,6 @@ MOST = 20
 KNOWN = {
     ("buses/modbus_rtu/rtu_bus.hpp", "RtuBus"): 27,
     ("devices/cia402_eds/simulator.hpp", "StandardDrive"): 43,
-    ("devices/yss_c/simulator.hpp", "SimulatedDrive"): 38,
 }
 
 CLASS = re.compile(r"^( *)class (\w+)[^;]*$")
