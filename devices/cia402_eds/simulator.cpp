@@ -48,42 +48,47 @@ StandardDrive::StandardDrive(SimulatedNodeSettings settings)
                .error_count_grows = settings_.sheet != nullptr},
               dictionary_, hooks(), [this](bool communication_only) { nmt_reset(communication_only); }),
       inputs_(cia402_eds::inputs, {home_switch, positive_limit, negative_limit}, settings_),
-      encoder_(settings_.encoder, settings_.address),
-      tachometer_({.noise = 1}, settings_.address) {
+      shaft_(settings_.encoder, settings_.address),
+      tachometer_({.noise = 1}, settings_.address),
+      objects_(dictionary_),
+      motion_(shaft_.motor()),
+      arrival_(objects_, shaft_),
+      homing_(behaviour_, objects_, inputs_, shaft_.motor()) {
   if (settings_.sheet)
     add_rows_of_sheet(dictionary_, settings_);
   else
     add_rows(dictionary_);
   for (const auto& [key, value] : settings_.eeprom) dictionary_.preset(key, value);
-  units_ = units_of(dictionary_, settings_.units);
+  objects_.set_units(units_of(dictionary_, settings_.units));
   if (!settings_.powered) return;
-  powered_ = true;
   restart(true);
-  boot_end_.reset();
+  supply_.skip_boot();
   server_.boot_quietly(settings_.address, now_);
 }
 
 /// Everything as after a power-up: nothing runs and nothing waits.
 void StandardDrive::restart(bool counter_lost) {
   cut();
-  boot_end_ = now_ + settings_.boot_time;
+  supply_.boot(now_ + settings_.boot_time);
   if (std::exchange(load_defaults_, false)) dictionary_.restore_factory();
   dictionary_.power_up();
   for (const auto index : volatile_objects())
     if (const auto* row = dictionary_.find(index, 0); row != nullptr)
       dictionary_.set(index, 0, row->default_value);
-  units_ = units_of(dictionary_, settings_.units);
-  if (counter_lost) motor_.power_up();
-  state_ = State::disabled;
-  control_ = 0;
-  mode_ = supports(dictionary_.get(0x6060)) ? static_cast<int>(dictionary_.get(0x6060)) : 0;
-  fault_ = last_fault_ = 0;
-  reached_ = acknowledged_ = limited_ = attained_ = homing_error_ = homing_interrupted_ = false;
+  objects_.set_units(units_of(dictionary_, settings_.units));
+  if (counter_lost) motor().power_up();
+  const auto mode = dictionary_.get(0x6060);
+  control_.reset(PowerState::disabled, supports(mode) ? static_cast<int>(mode) : 0);
   mode_changed_ = false;
-  activity_ = Activity::none;
-  stopping_ = velocity_held_ = false;
-  inputs_.settle(motor_.shaft(), {.functions = {negative_limit, positive_limit, home_switch}});
-  server_.boot(settings_.address, *boot_end_);
+  fault_.reset(false);
+  motion_.rest();
+  set_points_.drop_all();
+  set_points_.end_acknowledgement();
+  velocity_.release();
+  arrival_.forget();
+  homing_.forget();
+  inputs_.settle(motor().shaft(), {.functions = {negative_limit, positive_limit, home_switch}});
+  server_.boot(settings_.address, *supply_.boot_end());
 }
 
 void StandardDrive::nmt_reset(bool communication_only) {
@@ -96,15 +101,14 @@ void StandardDrive::nmt_reset(bool communication_only) {
 }
 
 void StandardDrive::set_power(bool on) {
-  if (on == powered_) return;
-  powered_ = on;
+  if (on == supply_.on()) return;
   if (on) {
     restart(true);
     return;
   }
   cut();
-  state_ = State::disabled;
-  boot_end_.reset();
+  control_.enter(PowerState::disabled);
+  supply_.switch_off();
   server_.switch_off();
 }
 
@@ -115,34 +119,34 @@ void StandardDrive::advance(TimePoint now) {
 }
 
 TimePoint StandardDrive::next_event() const {
-  if (!powered_) return TimePoint::max();
+  if (!supply_.on()) return TimePoint::max();
   return std::min({motion_event(), late_bits_event(), server_.next_event()});
 }
 
 TimePoint StandardDrive::motion_event() const {
-  if (boot_end_) return *boot_end_;
-  if (!motor_.moving()) return std::min(phase_due_, settling_event());
-  auto next = motor_.ends();
-  if (const auto most = window(0x6065)) next = std::min(next, motor_.lags(*most + 1));
-  const auto change = inputs_.next_switch(motor_.shaft(), motor_.direction());
-  return change ? std::min(next, motor_.reaches(*change)) : next;
+  if (const auto end = supply_.boot_end()) return *end;
+  if (!motor().moving()) return std::min(homing_.due(), arrival_.next_event(now_));
+  auto next = motor().ends();
+  if (const auto most = objects_.window(0x6065)) next = std::min(next, motor().lags(*most + 1));
+  const auto change = inputs_.next_switch(motor().shaft(), motor().direction());
+  return change ? std::min(next, motor().reaches(*change)) : next;
 }
 
 void StandardDrive::step(TimePoint now) {
   constexpr int following_error = 0x8611;
   now_ = now;
-  const bool ended = motor_.advance(now, energised());
+  const bool ended = motor().advance(now, energised());
   follow(now);
-  if (boot_end_ && now >= *boot_end_) boot_end_.reset();
+  supply_.booted(now);
   if (alive()) {
     for (const auto& edge :
-         inputs_.sample(now, motor_.shaft(), {.functions = {negative_limit, positive_limit, home_switch}}))
-      homing_edge(edge);
-    if (const auto most = window(0x6065); most && energised() && std::llabs(motor_.lag()) > *most)
+         inputs_.sample(now, motor().shaft(), {.functions = {negative_limit, positive_limit, home_switch}}))
+      if (motion_.is(Activity::homing)) act_on(homing_.on_edge(edge));
+    if (const auto most = objects_.window(0x6065); most && energised() && std::llabs(motor().lag()) > *most)
       fail_with(following_error);
     enforce_limits();
-    if (ended && !motor_.moving()) on_stopped();
-    if (phase_due_ <= now) next_phase();
+    if (ended && !motor().moving()) on_stopped();
+    if (homing_.due() <= now) act_on(homing_.next_phase());
     follow_velocity();
     // Event PDOs look when something changed; what changes with time alone they look at by themselves.
     if (const auto present = appearance(); std::exchange(appearance_, present) != present) server_.touch(now);
@@ -150,67 +154,37 @@ void StandardDrive::step(TimePoint now) {
   server_.advance(now);
 }
 
-/// Bit 10 comes with time alone.
-TimePoint StandardDrive::settling_event() const {
-  constexpr Duration cycle = std::chrono::milliseconds(1);
-  if (!reached_ || in_position()) return TimePoint::max();
-  if (in_window_since_)
-    return std::max(now_ + cycle, *in_window_since_ + std::chrono::milliseconds(dictionary_.get(0x6068)));
-  return encoder_.wavers(motor_) ? now_ + cycle : TimePoint::max();
-}
-
 TimePoint StandardDrive::late_bits_event() const {
   auto next = TimePoint::max();
-  for (const auto due : {acknowledgement_due_, homing_bits_due_})
+  for (const auto due : {set_points_.shown_from(), homing_.told_from()})
     if (due > now_) next = std::min(next, due);
   return next;
 }
 
-/// FFFFFFFFh switches either off.
-std::optional<std::int64_t> StandardDrive::window(std::uint16_t index) const {
-  constexpr std::int64_t off = 0xFFFFFFFF;
-  const auto most = value(index, off);
-  return most < 0 || most == off ? std::nullopt : std::optional(most);
+simulation::Hold StandardDrive::hold() const {
+  return {.in_control = energised(), .energised = energised(), .seen = supply_.on()};
 }
 
 /// What the load and the encoder do meanwhile.
 void StandardDrive::follow(TimePoint now) {
   constexpr double settling = 30, longest = 0.025;  // counts, seconds
-  auto following = encoder_.settings().following;
+  auto following = shaft_.encoder().settings().following;
   if (behaviour_.settles_over_30_counts)  // at the end of a ramp it is behind by ramp x time^2
     following = std::max(following, std::chrono::round<Duration>(std::chrono::duration<double>(
-                                        std::min(std::sqrt(settling / ramp(0x6084)), longest))));
-  motor_.follow_within(following);
-  if (!energised()) encoder_.relax();
-  const bool held = motor_.blocked() || motor_.moving() || energised();
-  if (const auto pulses = encoder_.slipped(now, !held); pulses != 0) motor_.push(pulses, powered_);
-  watch_window();
-}
-
-/// 6067h counts from the end of the ramp on.
-void StandardDrive::watch_window() {
-  const auto most = window(0x6067);
-  if (!reached_ || (most && std::llabs(encoder_.deviation(motor_, now_)) > *most))
-    in_window_since_.reset();
-  else if (!in_window_since_)
-    in_window_since_ = now_;
-}
-
-bool StandardDrive::in_position() const {
-  const auto most = window(0x6067);
-  if (!most) return reached_;
-  return in_window_since_ && now_ - *in_window_since_ >= std::chrono::milliseconds(dictionary_.get(0x6068)) &&
-         std::llabs(encoder_.deviation(motor_, now_)) <= *most;
+                                        std::min(std::sqrt(settling / objects_.ramp(0x6084)), longest))));
+  shaft_.follow(now, hold(), following);
+  arrival_.watch_window(now);
 }
 
 /// All that can change by itself and shows in mappable objects, but the position.
 std::uint64_t StandardDrive::appearance() const {
   return std::uint64_t{status()} | std::uint64_t{inputs_.bits()} << 16U |
-         (motor_.moving() ? std::uint64_t{1} << 32U : 0U) | static_cast<std::uint64_t>(starts_) << 33U;
+         (motor().moving() ? std::uint64_t{1} << 32U : 0U) |
+         static_cast<std::uint64_t>(motion_.starts()) << 33U;
 }
 
 void StandardDrive::on_frame(const can::Frame& frame) {
-  if (!powered_) return;
+  if (!supply_.on()) return;
   server_.on_frame(frame, now_);
   step(now_);
 }
@@ -228,25 +202,24 @@ void StandardDrive::raise_alarm(int code) {
 }
 
 void StandardDrive::block_shaft(bool blocked) {
-  motor_.block(blocked);
+  motor().block(blocked);
   step(now_);
 }
 
 bool StandardDrive::run_at(double factor) {
-  motor_.run_at(factor);
+  motor().run_at(factor);
   return true;
 }
 
 bool StandardDrive::push_shaft(std::int64_t pulses) {
-  if (motor_.blocked() || energised()) return false;
-  motor_.push(pulses, powered_);
+  if (!shaft_.push(pulses, hold())) return false;
   server_.touch(now_);
   step(now_);
   return true;
 }
 
 bool StandardDrive::lean_on_shaft(int counts) {
-  if (!energised() || !encoder_.lean(counts)) return false;
+  if (!shaft_.lean(counts, hold())) return false;
   server_.touch(now_);
   step(now_);
   return true;

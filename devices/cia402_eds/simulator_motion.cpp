@@ -9,37 +9,6 @@
 
 namespace axisd::cia402_eds {
 
-std::int64_t StandardDrive::value(std::uint16_t index, std::int64_t without) const {
-  return dictionary_.find(index, 0) == nullptr ? without : dictionary_.get(index);
-}
-
-/// Counts of the motor per second.
-double StandardDrive::speed(std::int64_t velocity) const {
-  return static_cast<double>(velocity) * (units_.velocity / units_.position);
-}
-
-/// 6081h, within 607Fh where that is anything.
-double StandardDrive::profile_speed() const {
-  const auto most = dictionary_.get(0x607F), wanted = dictionary_.get(0x6081);
-  return speed(most > 0 ? std::min(wanted, most) : wanted);
-}
-
-/// Counts of the motor per second squared; 0 in the object is at once. What a drive lacks has 6083h instead,
-/// and 6085h first 6084h.
-double StandardDrive::ramp(std::uint16_t index) const {
-  constexpr double at_once = 1e12, usual = 10;  // of its own: revolutions per second squared
-  while (dictionary_.find(index, 0) == nullptr) {
-    if (index == 0x6083) return usual / units_.position;
-    index = index == 0x6085 ? 0x6084 : 0x6083;
-  }
-  const auto set = dictionary_.get(index);
-  return set > 0 ? static_cast<double>(set) * (units_.acceleration / units_.position) : at_once;
-}
-
-simulation::Rates StandardDrive::rates(double cruise) const {
-  return {.cruise = cruise, .acceleration = ramp(0x6083), .deceleration = ramp(0x6084)};
-}
-
 /// 607Dh in the motor's numbers; nothing: the end of the range is no limit, and a range without room is none.
 std::optional<std::int64_t> StandardDrive::soft_limit(int direction) const {
   if (dictionary_.get(0x607D, 1) >= dictionary_.get(0x607D, 2)) return std::nullopt;
@@ -47,16 +16,15 @@ std::optional<std::int64_t> StandardDrive::soft_limit(int direction) const {
   const std::int64_t end =
       direction > 0 ? std::numeric_limits<std::int32_t>::max() : std::numeric_limits<std::int32_t>::min();
   if (limit == end) return std::nullopt;
-  return motor_.commanded() - motor_.counter() + limit;
+  return motor().commanded() - motor().counter() + limit;
 }
 
 /// A relative set-point counts from the target before it.
-StandardDrive::Plan StandardDrive::position_plan() const {
-  const bool relative = (control_ & 0x40U) != 0;
-  const auto base = relative ? last_target_ : motor_.commanded() - motor_.counter();
+Plan StandardDrive::position_plan() const {
+  const auto base = control_.relative() ? motion_.last_target() : motor().commanded() - motor().counter();
   Plan plan{.activity = Activity::position,
             .target = base + dictionary_.get(0x607A),
-            .rates = rates(profile_speed())};
+            .rates = objects_.rates(objects_.profile_speed())};
   for (const int direction : {1, -1}) {
     const auto limit = soft_limit(direction);
     if (!limit || (*plan.target - *limit) * direction <= 0) continue;
@@ -67,10 +35,10 @@ StandardDrive::Plan StandardDrive::position_plan() const {
 }
 
 /// Endless, or up to the software limit.
-StandardDrive::Plan StandardDrive::velocity_plan(std::int64_t velocity) const {
+Plan StandardDrive::velocity_plan(std::int64_t velocity) const {
   Plan plan{.activity = Activity::velocity,
             .direction = velocity < 0 ? -1 : 1,
-            .rates = rates(speed(std::llabs(velocity)))};
+            .rates = objects_.rates(objects_.speed(std::llabs(velocity)))};
   plan.target = soft_limit(plan.direction);
   plan.shortened = plan.target.has_value();
   return plan;
@@ -78,131 +46,163 @@ StandardDrive::Plan StandardDrive::velocity_plan(std::int64_t velocity) const {
 
 /// Rising edge of bit 4: 607Ah and its neighbours as they are now. Bit 5: at once, else after the one before.
 void StandardDrive::accept_set_point() {
-  if (acknowledged_ || (halted() && behaviour_.set_point_in_halt_refused)) return;
+  if (set_points_.acknowledged() || (control_.halted() && behaviour_.set_point_in_halt_refused)) return;
   constexpr Duration slow = std::chrono::milliseconds(10);
-  acknowledged_ = true;
-  acknowledgement_due_ = now_ + (behaviour_.acknowledges_late ? slow : Duration{});
+  set_points_.acknowledge(now_ + (behaviour_.acknowledges_late ? slow : Duration{}));
   const auto plan = position_plan();
-  last_target_ = *plan.target;
-  const bool under_way = activity_ == Activity::position && motor_.moving() && !stopping_;
-  if (halted())
-    suspended_ = plan;
-  else if (under_way && (control_ & 0x20U) == 0 && !behaviour_.set_points_change_at_once)
-    buffered_ = plan;
+  motion_.set_last_target(*plan.target);
+  if (control_.halted())
+    set_points_.suspend(plan);
+  else if (motion_.positions() && !control_.at_once() && !behaviour_.set_points_change_at_once)
+    set_points_.buffer(plan);
   else
     begin(plan);
 }
 
 void StandardDrive::begin(Plan plan) {
   if (plan.target) {
-    const auto distance = *plan.target - motor_.commanded();
+    const auto distance = *plan.target - motor().commanded();
     // At the software limit already, and not away from it.
     if (plan.activity == Activity::velocity && distance * plan.direction <= 0) {
-      limited_ = velocity_held_ = true;
+      arrival_.end_at_limit();
+      velocity_.hold();
       return;
     }
     plan.direction = distance < 0 ? -1 : 1;
   }
-  reached_ = mode_changed_ = false;
-  limited_ = plan.shortened && plan.activity == Activity::position;
+  mode_changed_ = false;
+  arrival_.begin(plan.shortened && plan.activity == Activity::position);
   if (plan.rates.cruise <= 0 || limit_active(plan.direction)) {
-    velocity_held_ = !behaviour_.velocity_resumes_after_limit;
+    velocity_.hold(!behaviour_.velocity_resumes_after_limit);
     return;
   }
-  ++starts_;
+  motion_.count_start();
   launch(plan);
 }
 
 void StandardDrive::launch(const Plan& plan) {
-  activity_ = plan.activity;
-  stopping_ = false;
-  pending_.reset();
-  const auto distance = plan.target.value_or(0) - motor_.commanded();
-  if (plan.activity == Activity::position) last_target_ = *plan.target;
-  const bool turns = motor_.moving() && plan.direction != motor_.direction();
-  const bool too_near = motor_.moving() && plan.target &&
-                        static_cast<double>(std::llabs(distance)) < motor_.stopping_distance(plan.rates);
-  if (turns || too_near) {
-    motor_.brake(plan.rates.deceleration);
-    pending_ = plan;
-  } else if (!plan.target) {
-    motor_.run(plan.direction, plan.rates);
-  } else if (distance != 0) {
-    motor_.move(distance, plan.rates);
-  } else {
+  motion_.take(plan);
+  if (!motion_.reachable(plan)) {
+    motor().brake(plan.rates.deceleration);
+    motion_.postpone(plan);
+  } else if (plan.target && *plan.target == motor().commanded()) {
     on_stopped();  // there already
+  } else {
+    motion_.go(plan);
   }
 }
 
 void StandardDrive::stop_motion(double deceleration) {
-  pending_.reset();
-  end_pause();
-  if (!motor_.moving()) return;
-  stopping_ = true;
-  phase_ = Phase::ending;
-  motor_.brake(deceleration);
+  motion_.drop_pending();
+  if (homing_.end_pause()) motion_.finish();
+  if (!motor().moving()) return;
+  motion_.interrupt();
+  homing_.interrupt();
+  motor().brake(deceleration);
 }
 
 /// The current is gone, or there is no distance left to brake.
 void StandardDrive::cut() {
-  pending_.reset();
-  end_pause();
-  if (!motor_.moving()) return;
-  stopping_ = true;
-  phase_ = Phase::ending;
-  motor_.stop(false);
+  motion_.drop_pending();
+  if (homing_.end_pause()) motion_.finish();
+  if (!motor().moving()) return;
+  motion_.interrupt();
+  homing_.interrupt();
+  motor().stop(false);
   on_stopped();
 }
 
 void StandardDrive::on_stopped() {
-  if (pending_) {
-    auto plan = *pending_;
-    // The braking may have carried it past the target.
-    if (plan.target) plan.direction = *plan.target < motor_.commanded() ? -1 : 1;
-    launch(plan);
+  if (const auto plan = motion_.take_pending()) {
+    launch(*plan);
     return;
   }
-  if (state_ == State::quick_stop && value(0x605A, 2) <= 2) state_ = State::disabled;
-  if (activity_ == Activity::homing) {
-    homing_stopped();
+  if (control_.is(PowerState::quick_stop) && objects_.value(0x605A, 2) <= 2)
+    control_.enter(PowerState::disabled);
+  if (motion_.is(Activity::homing)) {
+    act_on(homing_.on_stopped(now_));
     return;
   }
-  const auto ended = std::exchange(activity_, Activity::none);
-  if (std::exchange(stopping_, false)) return;
-  if (ended == Activity::velocity) {  // at the software limit
-    limited_ = velocity_held_ = true;
+  const bool at_software_limit = motion_.is(Activity::velocity), stopped = motion_.stopping();
+  motion_.finish();
+  if (stopped) return;
+  if (at_software_limit) {
+    arrival_.end_at_limit();
+    velocity_.hold();
     return;
   }
-  reached_ = !limited_;
-  watch_window();
-  if (behaviour_.acknowledgement_ends_with_motion) acknowledged_ = false;
-  if (auto next = std::exchange(buffered_, std::nullopt)) {
-    if ((control_ & 0x10U) == 0) acknowledged_ = false;
-    begin(*next);
+  arrival_.arrive(now_);
+  if (behaviour_.acknowledgement_ends_with_motion) set_points_.end_acknowledgement();
+  if (const auto next = set_points_.take_buffered(control_.start())) begin(*next);
+}
+
+void StandardDrive::start_homing() {
+  if (motor().moving()) return;
+  mode_changed_ = false;
+  switch (homing_.begin()) {
+    case Homing::Begin::unknown:
+      break;
+    case Homing::Begin::where_it_stands:
+      homing_done();
+      break;
+    case Homing::Begin::search:
+      motion_.count_start();
+      motion_.take({.activity = Activity::homing});
+      act_on(homing_.first_phase());
+      break;
   }
+}
+
+void StandardDrive::act_on(Homing::Outcome outcome) {
+  switch (outcome) {
+    case Homing::Outcome::goes_on:
+      break;
+    case Homing::Outcome::done:
+      homing_done();
+      break;
+    case Homing::Outcome::failed:
+      homing_failed();
+      break;
+    case Homing::Outcome::over:
+      motion_.finish();
+      break;
+  }
+}
+
+/// The zero position is home plus 607Ch; the drive does not move there.
+void StandardDrive::homing_done() {
+  constexpr Duration apart = std::chrono::milliseconds(20);
+  motor().set_counter(static_cast<std::int32_t>(-dictionary_.get(0x607C)));
+  motion_.set_last_target(motor().commanded());
+  homing_.attain(now_ + apart);
+  motion_.finish();
+}
+
+void StandardDrive::homing_failed() {
+  homing_.fail();
+  stop_motion(objects_.ramp(0x6085));
+  if (!motor().moving()) motion_.finish();
 }
 
 /// Profile velocity mode follows 60FFh as long as it is enabled and not halted.
 void StandardDrive::follow_velocity() {
-  if (state_ != State::operation || mode_ != 3 || halted()) return;
-  const auto wanted = velocity_held_ ? 0 : dictionary_.get(0x60FF);
-  if (activity_ == Activity::velocity) {
-    if (!stopping_ && wanted != velocity_) change_velocity(wanted);
-  } else if (wanted != 0 && !motor_.moving()) {
-    velocity_ = wanted;
+  if (!control_.operates() || control_.mode() != 3 || control_.halted()) return;
+  const auto wanted = velocity_.held() ? 0 : dictionary_.get(0x60FF);
+  if (motion_.is(Activity::velocity)) {
+    if (!motion_.stopping() && wanted != velocity_.velocity()) change_velocity(wanted);
+  } else if (wanted != 0 && !motor().moving()) {
+    velocity_.change_to(wanted);
     begin(velocity_plan(wanted));
   }
 }
 
 void StandardDrive::change_velocity(std::int64_t wanted) {
-  const bool turns = wanted == 0 || (wanted < 0) != (velocity_ < 0);
-  velocity_ = wanted;
-  if (turns) {
-    stop_motion(ramp(0x6084));  // and begins anew from standstill, if there is something to run
+  if (velocity_.change_to(wanted)) {
+    stop_motion(objects_.ramp(0x6084));  // and begins anew from standstill, if there is something to run
     return;
   }
   auto plan = velocity_plan(wanted);
-  if (!plan.target && plan.rates.cruise < motor_.speed()) plan.rates.acceleration = plan.rates.deceleration;
+  if (!plan.target && plan.rates.cruise < motor().speed()) plan.rates.acceleration = plan.rates.deceleration;
   launch(plan);
 }
 
@@ -212,16 +212,15 @@ bool StandardDrive::limit_active(int direction) const {
 
 /// At a limit switch the drive brakes and stays energised; what was asked for is over.
 void StandardDrive::enforce_limits() {
-  if (!motor_.moving() || !limit_active(motor_.direction())) return;
-  if (activity_ == Activity::homing) {
-    homing_limit();
+  if (!motor().moving() || !limit_active(motor().direction())) return;
+  if (motion_.is(Activity::homing)) {
+    act_on(homing_.at_limit());
     return;
   }
-  if (stopping_) return;
-  velocity_held_ = !behaviour_.velocity_resumes_after_limit;
-  suspended_.reset();
-  buffered_.reset();
-  stop_motion(ramp(behaviour_.limit_stops_on_ramp ? 0x6084 : 0x6085));
+  if (motion_.stopping()) return;
+  velocity_.hold(!behaviour_.velocity_resumes_after_limit);
+  set_points_.drop_all();
+  stop_motion(objects_.ramp(behaviour_.limit_stops_on_ramp ? 0x6084 : 0x6085));
 }
 
 }  // namespace axisd::cia402_eds

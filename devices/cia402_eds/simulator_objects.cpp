@@ -26,26 +26,27 @@ simulation::CanopenHooks StandardDrive::hooks() {
           .saves = [](const ObjectRow&) { return false; },  // on command only: 1010h
           .changing =
               [this] {
-                return motor_.moving() || encoder_.wavers(motor_) || behaviour_.velocity_wavers_at_rest;
+                return motor().moving() || shaft_.encoder().wavers(motor()) ||
+                       behaviour_.velocity_wavers_at_rest;
               }};
 }
 
 std::optional<std::int64_t> StandardDrive::read(const ObjectRow& row) const {
   switch (row.index) {
     case 0x603F:
-      return last_fault_;
+      return fault_.told();
     case 0x6041:
       return status();
     case 0x6061:
-      return mode_;
+      return control_.mode();
     case 0x6062:
-      return motor_.counter();
+      return motor().counter();
     case 0x6064:
-      return encoder_.position(motor_, now_);
+      return shaft_.measured(now_);
     case 0x606C:
       return velocity();
     case 0x60F4:
-      return encoder_.deviation(motor_, now_);
+      return shaft_.encoder().deviation(motor(), now_);
     case 0x60FD:
       return inputs_.bits();
     default:
@@ -56,9 +57,10 @@ std::optional<std::int64_t> StandardDrive::read(const ObjectRow& row) const {
 /// 606Ch: measured.
 std::int64_t StandardDrive::velocity() const {
   constexpr double minute = 60, most_noise = 30, most = std::numeric_limits<std::int32_t>::max();
-  const auto& meter = behaviour_.velocity_wavers_at_rest ? tachometer_ : encoder_;
-  const auto per_second = motor_.shaft_speed() * (units_.position / units_.velocity);
-  auto amount = 1 / minute / units_.velocity;
+  const auto& meter = behaviour_.velocity_wavers_at_rest ? tachometer_ : shaft_.encoder();
+  const auto& units = objects_.units();
+  const auto per_second = motor().shaft_speed() * (units.position / units.velocity);
+  auto amount = 1 / minute / units.velocity;
   if (behaviour_.velocity_wavers_by_threshold)
     amount = std::clamp(static_cast<double>(dictionary_.get(0x606F)), amount, most_noise * amount);
   const auto noise = meter.velocity_noise(now_) * amount;
@@ -68,16 +70,15 @@ std::int64_t StandardDrive::velocity() const {
 /// By 6502h where it says anything, and by the objects that the mode works with: profile position, profile
 /// velocity and homing are simulated.
 bool StandardDrive::supports(std::int64_t mode) const {
-  const auto has = [this](std::uint16_t index) { return dictionary_.find(index, 0) != nullptr; };
   if (mode < 1 || mode > 6) return false;
   if (const auto modes = dictionary_.get(0x6502); modes != 0 && (modes >> (mode - 1) & 1) == 0) return false;
   switch (mode) {
     case 1:
-      return has(0x607A) && has(0x6081);
+      return objects_.has(0x607A) && objects_.has(0x6081);
     case 3:
-      return has(0x60FF);
+      return objects_.has(0x60FF);
     case 6:
-      return has(0x6098);
+      return objects_.has(0x6098);
     default:
       return false;
   }
@@ -102,8 +103,7 @@ std::uint32_t StandardDrive::write(const ObjectRow& row, std::int64_t value, boo
     case 0x6060:
       return value == 0 || supports(value) ? abort_code::none : abort_code::value;
     case 0x6098:
-      return value == 0 || value == 35 || value == 37 || find_method(value) != nullptr ? abort_code::none
-                                                                                       : abort_code::value;
+      return Homing::knows(value) ? abort_code::none : abort_code::value;
     default:
       return abort_code::none;
   }
@@ -112,8 +112,8 @@ std::uint32_t StandardDrive::write(const ObjectRow& row, std::int64_t value, boo
 void StandardDrive::written(const ObjectRow& row) {
   if (row.index == 0x6040) control(static_cast<std::uint16_t>(dictionary_.get(0x6040)));
   if (row.index == 0x6060) set_mode(static_cast<int>(dictionary_.get(0x6060)));
-  if (row.index == 0x60FF) velocity_held_ = false;
-  if (says_rates(row.index)) units_ = units_of(dictionary_, settings_.units);
+  if (row.index == 0x60FF) velocity_.release();
+  if (says_rates(row.index)) objects_.set_units(units_of(dictionary_, settings_.units));
 }
 
 }  // namespace axisd::cia402_eds

@@ -27,7 +27,7 @@ class Supply {
   /// Of the boot under way, if there is one.
   [[nodiscard]] std::optional<TimePoint> boot_end() const { return boot_end_; }
   /// The boot has just ended. True once.
-  [[nodiscard]] bool booted(TimePoint now) {
+  bool booted(TimePoint now) {
     if (!boot_end_ || now < *boot_end_) return false;
     boot_end_.reset();
     return true;
