@@ -1,12 +1,12 @@
 """A cell of fake machines for tests of clients: an entrance that passes calls on as bytes and serves CellService, for what
 real machines do not do when a test wants it: falling silent, answering late, refusing."""
 import asyncio
-import threading
 
 import grpc
 import grpc.aio
 
 import fake_server  # makes axisd importable
+from between import OPTIONS, Threaded
 from fake_axis import refuse
 from axisd.cell.v1 import cell_service_pb2 as pb, cell_service_pb2_grpc as rpc
 from axisd.v1 import error_pb2, system_service_pb2 as system_pb, types_pb2
@@ -72,8 +72,7 @@ class FakeCell(rpc.CellServiceServicer):
 
     async def serve(self):
         """Returns the servers, the entrance's first, and its port."""
-        entrance = grpc.aio.server(options=(("grpc.http2.min_recv_ping_interval_without_data_ms", 900),
-                                            ("grpc.http2.max_ping_strikes", 0)))
+        entrance = grpc.aio.server(options=OPTIONS)
         entrance.add_generic_rpc_handlers((Forwarder(self),))
         rpc.add_CellServiceServicer_to_server(self, entrance)
         servers = [entrance]
@@ -201,38 +200,16 @@ class FakeCell(rpc.CellServiceServicer):
             await asyncio.sleep(0.01)
 
 
-class ThreadedCell:
+class ThreadedCell(Threaded):
     """The same on a thread of its own."""
 
     def __init__(self, names):
+        super().__init__(self._serve)
         self._names = names
-        self._ready = threading.Event()
-        self._thread = threading.Thread(target=lambda: asyncio.run(self._main()), daemon=True)
 
-    def __enter__(self):
-        self._thread.start()
-        if not self._ready.wait(60):
-            raise RuntimeError("the fake cell did not start")
-        return self
-
-    def __exit__(self, *_):
-        self._loop.call_soon_threadsafe(self._end.set)
-        self._thread.join(30)
-
-    async def _main(self):
-        self._loop = asyncio.get_running_loop()
-        self._end = asyncio.Event()
+    async def _serve(self):
         self.cell = FakeCell(self._names)
-        servers, port = await self.cell.serve()
-        self.address = f"127.0.0.1:{port}"
-        self._ready.set()
-        await self._end.wait()
-        for server in servers:
-            await server.stop(0)
-
-    def do(self, coroutine):
-        """On the cell's own thread."""
-        return asyncio.run_coroutine_threadsafe(coroutine, self._loop).result(60)
+        return await self.cell.serve()
 
     def calls(self, machine, method):
         return [request for name, request, _ in self.cell.machines[machine].calls if name == method]

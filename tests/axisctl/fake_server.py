@@ -5,15 +5,14 @@ in Error not_reached). Velocities are granted in steps of 3 units per second, as
 """
 import asyncio
 import contextlib
-import threading
 import time
 
 import grpc
 import grpc.aio
 from google.protobuf import duration_pb2
+from between import OPTIONS, Threaded
 from fake_axis import ENDS, STEP, FakeAxis, offline_detail, refuse  # makes axisd importable
 from fake_drives import SERVICES, FakeDrives, FakeEvents, FakeNodes
-from fake_explain import FakeExplain
 from fake_groups import SERVICES as GROUP_SERVICES, FakeGroups
 from fake_leases import SERVICES as LEASE_SERVICES, FakeLeases
 from fake_state import FakeState
@@ -25,7 +24,7 @@ from axisd.v1 import (axis_service_pb2 as axes_pb, axis_service_pb2_grpc as axes
 GRANTED_STEP = 3.0
 
 
-class FakeMachine(FakeDrives, FakeNodes, FakeEvents, FakeGroups, FakeLeases, FakeExplain, FakeState,
+class FakeMachine(FakeDrives, FakeNodes, FakeEvents, FakeGroups, FakeLeases, FakeState,
                   axes_rpc.AxisServiceServicer, command_rpc.CommandServiceServicer, bus_rpc.BusServiceServicer,
                   system_rpc.SystemServiceServicer):
     """All services. `calls` records (method, request, peer) of every call, for assertions. `losing`: of how many calls
@@ -416,8 +415,7 @@ class Losing(grpc.aio.ServerInterceptor):
 
 async def serve(machine, addresses):
     """Starts a server; returns it and the port of the first address (0 for a socket's path)."""
-    server = grpc.aio.server(interceptors=[Losing(machine)], options=(("grpc.http2.min_recv_ping_interval_without_data_ms", 900),
-                                      ("grpc.http2.max_ping_strikes", 0)))
+    server = grpc.aio.server(interceptors=[Losing(machine)], options=OPTIONS)
     for add in (axes_rpc.add_AxisServiceServicer_to_server, command_rpc.add_CommandServiceServicer_to_server,
                 bus_rpc.add_BusServiceServicer_to_server, system_rpc.add_SystemServiceServicer_to_server, *SERVICES,
                 *GROUP_SERVICES, *LEASE_SERVICES):
@@ -427,36 +425,17 @@ async def serve(machine, addresses):
     return server, ports[0]
 
 
-class ThreadedServer:
+class ThreadedServer(Threaded):
     """The fake daemon on a thread of its own, on a free TCP port or at an address, and optionally on a socket."""
 
     def __init__(self, address="127.0.0.1:0", socket_path=None):
-        self._wanted = address
-        self._socket_path = socket_path
-        self._ready = threading.Event()
-        self._thread = threading.Thread(target=lambda: asyncio.run(self._main()), daemon=True)
+        super().__init__(self._serve)
+        self._addresses = [address] + ([f"unix:{socket_path}"] if socket_path else [])
 
-    def __enter__(self):
-        self._thread.start()
-        if not self._ready.wait(60):
-            raise RuntimeError("the fake server did not start")
-        return self
-
-    def __exit__(self, *_):
-        if self._thread.is_alive():
-            self._loop.call_soon_threadsafe(self._end.set)
-            self._thread.join(30)
-
-    async def _main(self):
-        self._loop = asyncio.get_running_loop()
-        self._end = asyncio.Event()
+    async def _serve(self):
         self.machine = FakeMachine()
-        addresses = [self._wanted] + ([f"unix:{self._socket_path}"] if self._socket_path else [])
-        server, port = await serve(self.machine, addresses)
-        self.address = f"127.0.0.1:{port}"
-        self._ready.set()
-        await self._end.wait()
-        await server.stop(0)
+        server, port = await serve(self.machine, self._addresses)
+        return [server], port
 
     def calls(self, method):
         """Requests of one method so far."""

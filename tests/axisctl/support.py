@@ -9,7 +9,9 @@ import subprocess
 import time
 import unittest
 
+import between
 import fake_server  # makes axisd importable
+import simulated
 import axisd
 
 AXISCTL = os.environ["AXISCTL"]  # set by CTest
@@ -20,6 +22,21 @@ def environment():
     """The test's own: no server, certificates or colours from outside."""
     kept = {name: value for name, value in os.environ.items() if not name.startswith(("AXISD_", "NO_COLOR", "GRPC_"))}
     return kept | {"TERM": "xterm"}
+
+
+class SimulatedPythonTest(unittest.IsolatedAsyncioTestCase):
+    """The Python package's connection to a daemon with simulated drives, and what is between them."""
+
+    async def asyncSetUp(self):
+        self.daemon = simulated.daemon()
+        self.between = between.Between(self.daemon.server)
+        self.server, port = await self.between.start()
+        self.addAsyncCleanup(self.server.stop, 0)
+        self.machine = await self.enterAsyncContext(axisd.connect(f"127.0.0.1:{port}"))
+        self.feeder = self.machine.axis("feeder")
+
+    def calls(self, method):
+        return self.between.requests(method)
 
 
 class PythonTest(unittest.IsolatedAsyncioTestCase):
@@ -71,6 +88,14 @@ class AxisctlTest(unittest.TestCase):
 
     def on_terminal(self, *words, interrupt_at=None, env=None):
         return on_terminal(self, [AXISCTL, "--server", self.server.address, *words], interrupt_at, env)
+
+
+class SimulatedAxisctlTest(AxisctlTest):
+    """Against a daemon with simulated drives."""
+
+    def setUp(self):
+        self.daemon = simulated.daemon()
+        self.server = self.enterContext(between.Passage(self.daemon.server))
 
 
 def on_terminal(test, command, interrupt_at=None, env=None):

@@ -1,19 +1,22 @@
-"""What buses can promise: axisctl budget of a file and of the fake daemon."""
+"""What buses can promise: axisctl budget of a file and of the daemon."""
 import json
 import pathlib
 import re
 import tempfile
 import unittest
 
-from support import AxisctlTest
+import canned
+from support import AxisctlTest, SimulatedAxisctlTest
 
 SOURCE = pathlib.Path(__file__).parents[2]
 DEMO = str(SOURCE / "config/examples/demo.yaml")
 EXCEEDED = SOURCE / "tests/broken/budget.yaml"
 
 
-class OfTheDaemon(AxisctlTest):
+class OfTheDaemon(SimulatedAxisctlTest):
     def test_predicted_beside_seen(self):
+        self.assertRegex(self.ok("budget"), r"(?s)^line-a\nMOVING +UTILISATION.*\nfeeder +alone .*\nline-b\n")
+        self.server.answers |= {"GetBudget": canned.BUDGET, "ListGroups": canned.GROUPS}
         text = self.ok("budget")
         self.assertRegex(text, r"\n +0 +0\.25 +0\.50 +- +300\.0 ms +-\n")
         self.assertRegex(text, r"\nfeeder +alone +28\.0 ms +7\.0 ms +- \+ 150\.0 ms +10\.5 mm\n")

@@ -1,4 +1,4 @@
-"""axisctl run, plot and man, against the fake daemon."""
+"""axisctl run, plot and man, against the daemon with simulated drives."""
 import pathlib
 import re
 import signal
@@ -8,10 +8,10 @@ import tempfile
 import unittest
 import xml.etree.ElementTree as ElementTree
 
-from support import AXISCTL, LIMIT, AxisctlTest, environment
+from support import AXISCTL, LIMIT, AxisctlTest, SimulatedAxisctlTest, environment
 
 
-class FileTest(AxisctlTest):
+class FileTest(SimulatedAxisctlTest):
     def setUp(self):
         super().setUp()
         folder = tempfile.TemporaryDirectory()
@@ -24,12 +24,12 @@ class FileTest(AxisctlTest):
         return str(path)
 
     def calls(self):
-        return [name for name, _, _ in self.server.machine.calls if name not in ("GetAxis", "WatchCommand")]
+        return [name for name, _, _ in self.server.between.calls if name not in ("GetAxis", "WatchCommand")]
 
 
 class Run(FileTest):
     def test_line_by_line_until_the_end(self):
-        path = self.script("# to and fro", "move feeder 20mm --velocity 200 --wait", "", "axisctl move feeder -5 --relative",
+        path = self.script("# to and fro", "move feeder 20mm --velocity 200 --wait", "", "axisctl move feeder -5 --relative --wait",
                            "list   # where are they?")
         shown = self.ok("run", path)
         self.assertRegex(shown, r"(?s)\A2: move feeder 20mm --velocity 200 --wait\n.*Done.*\n4: .*MoveRelative.*\n5: list\nAXIS")
@@ -37,13 +37,15 @@ class Run(FileTest):
         self.assertEqual([line["kind"] for line in self.json("run", self.script("halt feeder"))], ["COMMAND_KIND_HALT"])
 
     def test_ends_at_the_first_line_that_does_not_succeed(self):
-        path = self.script("move sticky 5 --velocity 500 --wait", "move feeder 1")
+        self.daemon.simulate("block", "sticky", "on")
+        path = self.script("move sticky 90 --relative --velocity 500 --wait", "move feeder 1")
         self.assertEqual(self.fails(1, "run", path),
                          f"axisctl: {path}:1: did not succeed; the lines behind it were not executed")
+        self.daemon.simulate("block", "sticky", "off")
         path = self.script("list --names", "move feeder 9000mm", "move feeder 1")
         self.assertRegex(self.fails(4, "run", path), rf"^axisctl: {path}:2: feeder: .*permitted")
-        self.assertNotIn("MoveRelative", self.calls())
-        self.assertEqual(len(self.server.calls("MoveAbsolute")), 2)
+        self.assertEqual(self.calls().count("MoveRelative"), 1)
+        self.assertEqual(len(self.server.calls("MoveAbsolute")), 1)
 
     def test_nothing_is_executed_before_all_lines_are_right(self):
         for line, why in (("move feeder", "VALUE is required"), ("fly feeder", "see 'axisctl --help'"),
@@ -86,17 +88,17 @@ class Run(FileTest):
         self.assertEqual(self.calls(), ["Halt"])
 
     def test_ctrl_c_halts_what_it_started_and_nothing_else(self):
-        self.ok("move", "sticky", "300", "--velocity", "3")  # somebody else's
-        path = self.script("move feeder 30 --velocity 3", "enable turntable --wait",
-                           "move turntable 300 --velocity 3 --wait", "move feeder 0")
+        self.ok("move", "sticky", "300", "--relative", "--velocity", "6")  # somebody else's
+        path = self.script("move feeder 30 --velocity 6", "enable turntable --wait",
+                           "move turntable 300 --relative --velocity 9 --wait", "move feeder 0")
         status, shown = self.on_terminal("run", path, interrupt_at=r"\n3: .* %")
         self.assertEqual(status, 130, shown)
         self.assertEqual({request.axis for request in self.server.calls("Halt")}, {"feeder", "turntable"})
         self.assertIn(f"axisctl: {path}: interrupted", shown)
-        self.assertEqual(len(self.server.calls("MoveAbsolute")), 3, "the last line was not executed")
+        self.assertEqual(len(self.server.calls("MoveAbsolute")), 1, "the last line was not executed")
 
     def test_ctrl_c_in_a_jog_ends_the_script(self):
-        path = self.script("jog feeder 5", "move feeder 0")
+        path = self.script("jog feeder 6", "move feeder 0")
         status, shown = self.on_terminal("run", path, interrupt_at=r"Jog")
         self.assertEqual(status, 130, shown)
         self.assertEqual(self.server.calls("MoveAbsolute"), [])
@@ -120,7 +122,7 @@ class Plot(FileTest):
         texts = [element.text for element in picture.iter("{http://www.w3.org/2000/svg}text")]
         self.assertIn("position, mm", texts)
         self.assertIn("velocity, mm/s", texts)
-        self.assertTrue(any(re.search(r"from 0 mm to 30 mm, at most 99 mm/s$", text) for text in texts), texts)
+        self.assertTrue(any(re.search(r"from 0 mm to 30 mm, at most 98\.6667 mm/s$", text) for text in texts), texts)
         paths = [(path.get("class"), path.get("d")) for path in picture.iter("{http://www.w3.org/2000/svg}path")]
         for line in ("position", "velocity"):  # and not only in the legend
             self.assertTrue(any(name == line and way.count("L") > 10 for name, way in paths), paths)
@@ -128,7 +130,7 @@ class Plot(FileTest):
     def test_ctrl_c_draws_what_there_is(self):
         self.ok("move", "feeder", "390", "--velocity", "9")
         process = self.record("feeder", "--output", "-")
-        while not self.server.machine.axes["feeder"].state.position > 3:
+        while not self.daemon.client.state("feeder").position > 3:
             self.assertIsNone(process.poll())
         process.send_signal(signal.SIGINT)
         self.assertIn("</svg>", process.communicate(timeout=LIMIT)[0])

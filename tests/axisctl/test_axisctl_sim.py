@@ -4,7 +4,8 @@ import threading
 import unittest
 import uuid
 
-from support import AxisctlTest
+from support import SimulatedAxisctlTest  # makes axisd importable
+from axisd.v1 import system_service_pb2 as system_pb
 
 
 class SimulatedDrives:
@@ -31,11 +32,11 @@ class SimulatedDrives:
                     stream.flush()
 
 
-class Sim(AxisctlTest):
+class Sim(SimulatedAxisctlTest):
     def setUp(self):
         super().setUp()
         instance = str(uuid.uuid4())
-        self.server.machine.instance_id = instance
+        self.server.answers["GetInfo"] = system_pb.GetInfoResponse(instance_id=instance)
         self.drives = SimulatedDrives(instance, {
             "axis feeder show": "ok the load is at 12.5 mm, at rest, 3 starts",
             "axis ghost power off": "error bus 'line-b' is not simulated; only drives on a bus with port: sim take this"})
@@ -74,7 +75,7 @@ class Sim(AxisctlTest):
         self.assertEqual(self.drives.lines, [])
 
     def test_a_daemon_without_simulated_drives(self):
-        self.server.machine.instance_id = str(uuid.uuid4())
+        self.server.answers["GetInfo"] = system_pb.GetInfoResponse(instance_id=str(uuid.uuid4()))
         self.assertRegex(self.fails(3, "sim", "show", "feeder"),
                          "the simulated drives do not answer: Connection refused; this works on the daemon's own computer")
 

@@ -1,10 +1,10 @@
-"""Why an axis cannot move: axisctl explain and Axis.explain() against the fake daemon."""
+"""Why an axis cannot move: axisctl explain and Axis.explain() against the daemon with simulated drives."""
 import unittest
 
-from support import AxisctlTest, PythonTest
+from support import SimulatedAxisctlTest, SimulatedPythonTest
 
 
-class Axisctl(AxisctlTest):
+class Axisctl(SimulatedAxisctlTest):
     def test_nothing_in_the_way(self):
         self.assertEqual(self.ok("explain", "feeder"), "feeder: motion is permitted now\n")
         self.assertEqual(self.ok("explain", "feeder", "move", "120mm", "--velocity", "50mm/s"),
@@ -16,22 +16,21 @@ class Axisctl(AxisctlTest):
         done = self.run_axisctl("explain", "turntable", "home")
         self.assertEqual((done.returncode, done.stderr), (4, ""))
         self.assertEqual(done.stdout, "turntable: home is refused now\n"
-                                      "  refused disabled: the power stage is off\n"
-                                      "          -> enable the axis first: axisctl enable turntable\n"
-                                      "  note    moving: the axis moves\n"
-                                      "          -> the start waits for standstill\n")
+                                      "  refused disabled: line-a node 2: the power stage is off\n"
+                                      "          -> enable the axis first: axisctl enable turntable\n")
         done = self.run_axisctl("explain", "feeder", "move", "500")
-        self.assertIn("  refused soft limit: the target is beyond a software limit (permitted 0 to 400 mm)\n",
-                      done.stdout)
+        self.assertIn("  refused soft limit: target 500 mm is beyond a software limit (permitted 0 to 400 mm)\n"
+                      "          -> choose a target within the limits\n", done.stdout)
         self.assertEqual(done.returncode, 4)
 
     def test_what_only_delays_is_no_refusal(self):
-        self.assertIn("turntable: enable is permitted now\n  note    moving", self.ok("explain", "turntable", "enable"))
+        self.ok("move", "feeder", "390", "--velocity", "30")
+        self.assertIn("feeder: move is permitted now\n  note    moving", self.ok("explain", "feeder", "move", "5"))
 
     def test_every_command_can_be_asked_about(self):
         for words, field in ((["disable"], "disable"), (["home"], "home"), (["reset"], "reset"),
-                             (["move", "--relative", "-5"], "move_relative"), (["velocity", "-5mm/s"], "move_velocity"),
-                             (["jog", "5", "--hold", "500ms"], "jog"), (["set-position", "0"], "set_position")):
+                             (["move", "--relative", "5"], "move_relative"), (["velocity", "30mm/s"], "move_velocity"),
+                             (["jog", "30", "--hold", "500ms"], "jog"), (["set-position", "0"], "set_position")):
             with self.subTest(words):
                 self.ok("explain", "feeder", *words)
                 self.assertEqual(self.server.calls("Explain")[-1].WhichOneof("command"), field)
@@ -48,19 +47,21 @@ class Axisctl(AxisctlTest):
         self.assertIn("no axis 'nobody'", self.fails(4, "explain", "nobody"))
 
 
-class Python(PythonTest):
+class Python(SimulatedPythonTest):
     def question(self):
-        return self.fake.calls[-1][1]
+        return self.calls("Explain")[-1]
 
     async def test_obstacles(self):
         self.assertEqual(await self.machine.axis("feeder").explain(), [])
-        off, moving = await self.machine.axis("turntable").explain("home")
+        (off,) = await self.machine.axis("turntable").explain("home")
         self.assertEqual((off.blocking, off.reason, off.remedy),
                          (True, "disabled", "enable the axis first: axisctl enable turntable"))
-        self.assertFalse(moving.blocking)
         (far,) = await self.machine.axis("feeder").explain("move", 500, velocity=20)
         self.assertEqual((far.permitted.minimum, far.permitted.maximum), (0, 400))
         self.assertIn("permitted 0 to 400 mm", str(far))
+        await self.machine.axis("feeder").move(390, velocity=30, wait=False)
+        (moving,) = await self.machine.axis("feeder").explain("move", 5)
+        self.assertEqual((moving.blocking, moving.reason), (False, "moving"))
 
     async def test_every_command_can_be_asked_about(self):
         feeder = self.machine.axis("feeder")
@@ -78,8 +79,7 @@ class Python(PythonTest):
     async def test_it_is_asked_under_the_lease(self):
         async with self.machine.lease("feeder") as lease:
             await lease.axis("feeder").explain("home")
-            self.assertEqual([call for call in self.fake.calls if call[0] == "Explain"][-1][1].lease_token,
-                             self.fake.last_token)
+            self.assertEqual(self.question().lease_token, lease.token)
 
 
 if __name__ == "__main__":

@@ -3,22 +3,18 @@ import socket
 import subprocess
 import unittest
 
-import fake_server  # builds the package and puts it on the path
+from between import Passage
+from support import AXISCTL, LIMIT, SimulatedAxisctlTest, SimulatedPythonTest, environment  # makes axisd importable
 import axisd
-from axisd.v1 import error_pb2
-from support import AXISCTL, LIMIT, AxisctlTest, PythonTest, environment
+from axisd.v1 import error_pb2, group_service_pb2 as group_pb, types_pb2
 
 ALWAYS = 1_000_000
+OFFLINE = error_pb2.ErrorDetail(reason=error_pb2.REASON_OFFLINE, message="the drive does not answer")
+UNCONFIRMED = error_pb2.ErrorDetail(reason=error_pb2.REASON_NOT_CONFIRMED, message="sticky: standstill was not confirmed",
+                                    remedy="look at the machine")
 
 
-class ClientTest(PythonTest):
-    async def asyncSetUp(self):
-        await super().asyncSetUp()
-        self.feeder = self.machine.axis("feeder")
-
-    def calls(self, method):
-        return [request for name, request, _ in self.fake.calls if name == method]
-
+class ClientTest(SimulatedPythonTest):
     def request_ids(self, method):
         return [request.options.request_id for request in self.calls(method)]
 
@@ -27,7 +23,7 @@ class LostAnswers(ClientTest):
     async def test_stops_are_repeated_as_they_are(self):
         for method, stop in (("Halt", self.feeder.halt), ("Stop", self.feeder.stop),
                              ("QuickStop", self.feeder.quick_stop)):
-            self.fake.losing[method] = 2
+            self.between.losing[method] = 2
             self.assertIs((await stop()).state, axisd.CommandState.DONE)
             self.assertEqual(len(self.request_ids(method)), 3)
             self.assertEqual(len(set(self.request_ids(method))), 1)
@@ -35,23 +31,23 @@ class LostAnswers(ClientTest):
             self.assertEqual(len(set(self.request_ids(method))), 2, "another stop is another request")
 
     async def test_stops_of_several_are_repeated_as_they_are(self):
-        self.fake.losing.update(GroupStop=2, GroupHalt=2, StopAll=2)
+        self.between.losing.update(GroupStop=2, GroupHalt=2, StopAll=2)
         group = self.machine.group(axes=("feeder", "turntable"))
         self.assertEqual(set(await group.stop(hold=True)), {"feeder", "turntable"})
         self.assertEqual(len(self.calls("GroupStop")), 3)
         self.assertEqual(len({request.request_id for request in self.calls("GroupStop")}), 1)
         await group.halt()
         self.assertEqual(len(self.calls("GroupHalt")), 3)
-        await self.machine.stop_all()
+        await self.machine.stop_all(wait=False)
         self.assertEqual(len(self.calls("StopAll")), 3)
 
     async def test_a_cancel_is_repeated(self):
-        command = await self.feeder.velocity(3)
-        self.fake.losing["CancelCommand"] = 1
+        command = await self.feeder.velocity(30)
+        self.between.losing["CancelCommand"] = 1
         self.assertIs((await self.machine.cancel(command.id)).state, axisd.CommandState.ABORTED)
 
     async def test_after_the_time_limit_it_is_told_that_nobody_knows(self):
-        self.fake.losing.update(Stop=ALWAYS)
+        self.between.losing.update(Stop=ALWAYS)
         self.machine.timeout = 0.3
         with self.assertRaisesRegex(axisd.UnreachableError, "repeated for 0.3 s: whether it arrived is not known") as raised:
             await self.feeder.stop()
@@ -59,14 +55,14 @@ class LostAnswers(ClientTest):
         self.assertGreater(len(self.calls("Stop")), 2)
 
     async def test_nothing_else_is_ever_repeated(self):
-        self.fake.losing.update(MoveRelative=1, Disable=1, ReleaseStop=1, MoveGroup=1)
+        self.between.losing.update(MoveRelative=1, Disable=1, ReleaseStop=1, MoveGroup=1)
         with self.assertRaises(axisd.UnreachableError) as raised:
             await self.feeder.move_relative(5)
         self.assertEqual(self.request_ids("MoveRelative"), [raised.exception.request_id])
         self.assertFalse(raised.exception.nothing_sent)
-        self.fake.hold(self.fake.axes["feeder"], "")
-        for call in (self.feeder.release_stop(), self.feeder.disable(),
-                     self.machine.group("transfer").move({"feeder": 1})):
+        self.daemon.hold("turntable", "")
+        for call in (self.machine.group("transfer").move({"feeder": 1}), self.machine.axis("turntable").release_stop(),
+                     self.feeder.disable()):
             with self.assertRaises(axisd.UnreachableError):
                 await call
         for method in ("Disable", "ReleaseStop", "MoveGroup"):
@@ -83,17 +79,17 @@ class Held(ClientTest):
         return (await self.machine.axis(axis).state()).holds
 
     async def test_a_program_releases_what_it_holds_and_nothing_else(self):
-        self.fake.hold(self.fake.axes["feeder"], "another program's")
-        self.fake.hold(self.fake.axes["feeder"], "")
+        self.daemon.hold("feeder", "another-program")
+        self.daemon.hold("feeder", "")
         await self.feeder.stop(hold=True)
         await self.feeder.quick_stop(hold=True)
         self.assertEqual(len(await self.holds()), 4)
         left = await self.feeder.release_stop()
-        self.assertEqual([hold.request_id for hold in left], ["another program's", ""])
+        self.assertEqual({hold.request_id for hold in left}, {"another-program", ""})
         self.assertEqual(left, await self.holds())
-        self.assertEqual(left[0].since.year, 2023)
+        self.assertGreaterEqual(left[0].since.year, 2023)
         await self.feeder.release_stop()  # holds none itself: the one without a name
-        self.assertEqual([hold.request_id for hold in await self.holds()], ["another program's"])
+        self.assertEqual([hold.request_id for hold in await self.holds()], ["another-program"])
 
     async def test_a_hold_by_name_is_released_by_name(self):
         await self.feeder.stop(hold=True, request_id="guard-door")
@@ -110,7 +106,7 @@ class Held(ClientTest):
             await self.feeder.release_stop()
 
     async def test_a_stop_without_an_answer_is_released_too(self):
-        self.fake.losing["Stop"] = ALWAYS
+        self.between.losing["Stop"] = ALWAYS
         self.machine.timeout = 0.3
         with self.assertRaises(axisd.UnreachableError):
             await self.feeder.stop(hold=True)
@@ -124,12 +120,12 @@ class Held(ClientTest):
         self.assertEqual(await self.feeder.release_stop(), ())
 
     async def test_groups(self):
-        self.fake.hold(self.fake.axes["turntable"], "r", holder="panel")
+        self.daemon.hold("turntable", "r")
         group = self.machine.group("transfer")
         await group.stop(hold=True)
         await group.stop(hold=True)
         left = await group.release_stop()
-        self.assertEqual((left["feeder"], [hold.holder for hold in left["turntable"]]), ((), ["panel"]))
+        self.assertEqual((left["feeder"], [hold.request_id for hold in left["turntable"]]), ((), ["r"]))
         await group.stop(hold=True)
         self.assertEqual(await self.feeder.release_stop(), (), "of its axes one by one, too")
         self.assertEqual(len(await self.holds("turntable")), 2)
@@ -156,7 +152,11 @@ class NoDaemon(unittest.IsolatedAsyncioTestCase):
 class StopsOfSeveral(ClientTest):
     async def test_each_that_did_not_confirm_is_named_with_its_cause(self):
         group = self.machine.group(axes=("feeder", "ghost", "sticky"))
-        for stop in (group.stop, group.halt):
+        for method, stop in (("GroupStop", group.stop), ("GroupHalt", group.halt)):
+            self.between.answers[method] = getattr(group_pb, f"{method}Response")(results=[
+                {"name": "feeder", "command": {"axis": "feeder", "state": types_pb2.COMMAND_STATE_DONE}},
+                {"name": "ghost", "error": OFFLINE},
+                {"name": "sticky", "command": {"axis": "sticky", "state": types_pb2.COMMAND_STATE_ERROR, "cause": UNCONFIRMED}}])
             with self.assertRaises(axisd.StopError) as raised:
                 await stop()
             self.assertEqual(set(raised.exception.failed), {"ghost", "sticky"})
@@ -168,18 +168,20 @@ class StopsOfSeveral(ClientTest):
     async def test_without_waiting_it_has_to_be_accepted(self):
         self.assertEqual(set(await self.machine.group(axes=("feeder", "sticky")).stop(wait=False)), {"feeder", "sticky"})
         with self.assertRaises(axisd.StopError) as raised:
-            await self.machine.group(axes=("feeder", "ghost")).stop(wait=False)
-        self.assertEqual(set(raised.exception.failed), {"ghost"})
+            await self.machine.group(axes=("feeder", "nobody")).stop(wait=False)
+        self.assertEqual(set(raised.exception.failed), {"nobody"})
 
     async def test_a_misspelt_member_is_named_and_the_others_are_stopped(self):
-        with self.assertRaisesRegex(axisd.StopError, "feedr: there is no axis 'feedr'; did you mean") as raised:
+        with self.assertRaisesRegex(axisd.StopError, "feedr: there is no axis 'feedr'; list them: axisctl list") as raised:
             await self.machine.group(axes=("feedr", "turntable")).stop()
         self.assertEqual([result.confirmed for result in raised.exception.results], [False, True])
 
     async def test_a_block_that_ends_by_an_error_tells_that_its_axes_may_move(self):
+        self.between.answers["GroupStop"] = group_pb.GroupStopResponse(results=[{"name": "ghost", "error": OFFLINE}])
         with self.assertRaises(axisd.StopError) as raised:
             async with self.machine.group(axes=("feeder", "ghost")):
                 raise KeyError("of the program")
+        self.between.answers.clear()
         self.assertIsInstance(raised.exception.__cause__, KeyError)
         with self.assertRaises(KeyError):
             async with self.machine.group(axes=("feeder", "turntable")):
@@ -245,28 +247,28 @@ class Reasons(ClientTest):
         self.assertEqual(raised.exception.reason, "soft_limit")
 
 
-class CommandLine(AxisctlTest):
+class CommandLine(SimulatedAxisctlTest):
     def ids(self, method):
         return [request.options.request_id for request in self.server.calls(method)]
 
     def test_stops_are_repeated_as_they_are(self):
         for method, word in (("Halt", "halt"), ("Stop", "stop"), ("QuickStop", "quick-stop")):
-            self.server.machine.losing[method] = 2
+            self.server.losing[method] = 2
             self.ok(word, "feeder", "turntable")
             self.assertEqual(len(self.ids(method)), 4)
             self.assertEqual(len(set(self.ids(method))), 2)
-        self.server.machine.losing.update(Stop=2)
+        self.server.losing.update(Stop=2)
         self.ok("stop", "feeder", "--hold")
-        self.assertEqual(len(self.server.machine.axes["feeder"].state.holds), 1, "repetitions are one hold")
-        self.server.machine.losing.update(GroupStop=2, StopAll=2)
+        self.assertEqual(len(self.daemon.client.state("feeder").holds), 1, "repetitions are one hold")
+        self.server.losing.update(GroupStop=2, StopAll=2)
         self.ok("group", "stop", "transfer", "--hold")
         self.assertEqual(len({request.request_id for request in self.server.calls("GroupStop")}), 1)
         self.assertIn("released", self.ok("release-stop", "--all"))
-        self.assertEqual(self.run_axisctl("stop", "--all").returncode, 1, "one axis does not answer")
+        self.ok("stop", "--all")
         self.assertEqual(len(self.server.calls("StopAll")), 3)
 
     def test_each_axis_is_told_of(self):
-        self.server.machine.losing["Stop"] = ALWAYS
+        self.server.losing["Stop"] = ALWAYS
         done = self.run_axisctl("--timeout", "300ms", "stop", "feeder", "nobody", "turntable")
         self.assertEqual(done.returncode, 3)
         self.assertRegex(done.stderr, "feeder.*repeated for 300 ms: whether it arrived is not known")
@@ -288,13 +290,13 @@ class CommandLine(AxisctlTest):
         self.addCleanup(stop.kill)
         with self.assertRaises(subprocess.TimeoutExpired):
             stop.wait(1)  # it has failed to connect by then, and goes on
-        with fake_server.ThreadedServer(address) as server:
+        with Passage(self.daemon.server, address) as server:
             printed, errors = stop.communicate(timeout=LIMIT)
             self.assertEqual((stop.returncode, errors), (0, ""), printed)
             self.assertEqual(len(server.calls("Stop")), 1)
 
     def test_motion_is_not_repeated(self):
-        self.server.machine.losing["MoveAbsolute"] = 1
+        self.server.losing["MoveAbsolute"] = 1
         self.assertIn("--request-id ", self.fails(3, "move", "feeder", "5mm"))
         self.assertEqual(len(self.server.calls("MoveAbsolute")), 1)
 
