@@ -7,6 +7,10 @@
 #include <algorithm>
 #include <filesystem>
 #include <set>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
 
 #include "tests/support/temporary_directory.hpp"
 #include "tests/unit/config/support.hpp"
