@@ -17,7 +17,7 @@ namespace axisd {
 
 struct DriveDescriptor;
 
-/// A drive that was told to start is expected to move within this; what it has not begun by then, it does not.
+/// A drive that was told to start begins to move within this: what it has not begun by then, it does not.
 inline constexpr Duration start_window = std::chrono::milliseconds(500);
 
 /// What the drive itself says it is doing.

@@ -211,8 +211,7 @@ Task<Result<void>> DriveConnection::prove_or_configure() {
     // Also where an earlier run of the daemon knew the drive (M1). If that does not count from 0, that run
     // has died before it kept what it wrote last. A driver that knows no canary yet would never say so:
     // here only the counter is asked.
-    const bool counts_on =
-        context_.drive->counts_on(*shaft_.sample()) && !context_.may_move_by_itself();
+    const bool counts_on = context_.drive->counts_on(*shaft_.sample()) && !context_.may_move_by_itself();
     if (!proof && !counts_on) power_.restarted();
     if (restorable && !proof) void_saved_position();
     if (restorable && (!proof || restorable->trust == PositionTrust::unknown)) {
