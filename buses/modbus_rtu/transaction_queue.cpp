@@ -129,8 +129,10 @@ TransactionPtr TransactionQueue::pop(std::optional<TimePoint> awaited_by) {
   const auto top = first_class();
   if (top == lanes_.size()) return nullptr;
   const bool before_motion = top == motion && awaited_by && is_awaited(*awaited_by);
-  auto transaction = give(before_motion ? readings : top);
+  auto transaction =
+      before_motion ? give(readings, next_awaited(*awaited_by)) : give(top, lanes_.at(top).begin()->get());
   transaction->reserved |= before_motion;
+  note_passing(*transaction);
   return transaction;
 }
 
@@ -140,6 +142,7 @@ TransactionPtr TransactionQueue::pop(TransactionClass lowest) {
   if (top > static_cast<std::size_t>(lowest)) return nullptr;
   auto transaction = take(lanes_.at(top).begin()->get());
   transaction->reserved = false;
+  note_passing(*transaction);
   return transaction;
 }
 
@@ -149,18 +152,17 @@ std::size_t TransactionQueue::first_class() const {
   return static_cast<std::size_t>(first - lanes_.begin());
 }
 
-/// The next one of class `top`, or of a class below it that has the reservation.
-TransactionPtr TransactionQueue::give(std::size_t top) {
+/// `first`, which is of class `top`, or the next one of a class below it that has the reservation.
+TransactionPtr TransactionQueue::give(std::size_t top, Transaction* first) {
   constexpr auto stop = static_cast<std::size_t>(TransactionClass::stop);
-  auto* chosen = &lanes_.at(top);
   auto* lower = top == stop ? nullptr : next_below(top);
   const bool reserved = lower != nullptr && ++popped_since_reservation_ >= reservation_;
   if (reserved) {
     popped_since_reservation_ = 0;
     last_reserved_ = static_cast<std::size_t>(lower - lanes_.data());
-    chosen = lower;
+    first = lower->begin()->get();
   }
-  auto transaction = take(chosen->begin()->get());
+  auto transaction = take(first);
   transaction->reserved = reserved;
   return transaction;
 }
@@ -168,6 +170,27 @@ TransactionPtr TransactionQueue::give(std::size_t top) {
 bool TransactionQueue::is_awaited(TimePoint by) const {
   return std::ranges::any_of(lanes_.at(static_cast<std::size_t>(TransactionClass::moving_state)),
                              [by](const TransactionPtr& one) { return one->awaited_from <= by; });
+}
+
+/// The reading that is awaited longest by then, of those that may go before all that came before them; else
+/// the next one of its class. Precondition: one is awaited.
+Transaction* TransactionQueue::next_awaited(TimePoint by) const {
+  const auto& readings = lanes_.at(static_cast<std::size_t>(TransactionClass::moving_state));
+  Transaction* next = nullptr;
+  std::bitset<256> passed;  // whoever waits before it: by these nodes, or one of theirs does
+  for (const auto& one : readings) {
+    const auto node = one->exchange.request.node;
+    const bool sooner = next == nullptr || one->awaited_from < next->awaited_from;
+    if (one->awaited_from <= by && sooner && !passed.test(node)) next = one.get();
+    passed |= one->passed_by;
+    passed.set(node);
+  }
+  return next == nullptr ? readings.begin()->get() : next;
+}
+
+void TransactionQueue::note_passing(const Transaction& gone) {
+  if (lane_class(gone) != TransactionClass::moving_state) return;
+  for (const auto& one : lane(TransactionClass::moving_state)) one->passed_by.set(gone.exchange.request.node);
 }
 
 const Transaction* TransactionQueue::next_of(TransactionClass transaction_class) const {

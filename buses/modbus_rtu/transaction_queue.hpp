@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <bitset>
 #include <cstdint>
 #include <functional>
 #include <map>
@@ -39,6 +40,8 @@ struct Transaction {
   /// Called exactly once each, unless its watch ends between two readings. Several: identical reads or stops
   /// that were merged.
   std::vector<std::function<void(const Transaction&, const ExchangeResult&)>> on_end;
+  /// Of what waits with the readings of moving axes: nodes of which one went before it meanwhile.
+  std::bitset<256> passed_by;
 };
 using TransactionPtr = std::unique_ptr<Transaction>;
 
@@ -64,8 +67,9 @@ class TransactionQueue {
   /// Returns one that pop() gave out but that was not sent, to its old place.
   void put_back(TransactionPtr transaction);
   /// The next one, or nullptr. Whether it may be sent still is the caller's to ask. `awaited_by`: motion can
-  /// wait; where a reading of class moving_state is awaited by then its class goes before motion. Within the
-  /// class nothing changes: whoever waits for another reading is not kept waiting by it.
+  /// wait; where a reading of class moving_state is awaited by then its class goes before motion: of it the
+  /// one that is awaited longest. Whoever waits for another reading is passed once by each node at most, as
+  /// in order of arrival.
   TransactionPtr pop(std::optional<TimePoint> awaited_by = {});
   /// The next one of class `lowest` or above, or nullptr; nothing goes before its turn.
   TransactionPtr pop(TransactionClass lowest);
@@ -129,8 +133,10 @@ class TransactionQueue {
   TransactionPtr take(Transaction* transaction);
   bool merge(Transaction& transaction);
   [[nodiscard]] std::size_t first_class() const;
-  TransactionPtr give(std::size_t top);
+  TransactionPtr give(std::size_t top, Transaction* first);
   [[nodiscard]] bool is_awaited(TimePoint by) const;
+  [[nodiscard]] Transaction* next_awaited(TimePoint by) const;
+  void note_passing(const Transaction& gone);
   Lane* next_below(std::size_t top);
 
   std::array<Lane, transaction_class_count> lanes_;

@@ -61,22 +61,23 @@ TEST(TransactionQueue, EarliestDeadlineThenArrival) {
   EXPECT_EQ(drain(queue), (std::vector<std::uint16_t>{3, 4, 2, 1}));
 }
 
-TransactionPtr awaited_read(std::uint16_t address, TimePoint from, Class of = Class::moving_state) {
-  auto reading = read_of(address, of);
+TransactionPtr awaited_read(std::uint16_t address, TimePoint from, std::uint8_t node = 1,
+                            Class of = Class::moving_state) {
+  auto reading = read_of(address, of, TimePoint::max(), node);
   reading->awaited_from = from;
   return reading;
 }
 
-TEST(TransactionQueue, AnAwaitedReadingTakesItsClassBeforeMotionThatCanWait) {
+TEST(TransactionQueue, AnAwaitedReadingGoesBeforeMotionThatCanWait) {
   TransactionQueue queue;
   const TimePoint now{10s};
   const auto pops = [&](std::optional<TimePoint> awaited_by) {
     return queue.pop(awaited_by)->exchange.request.address;
   };
   queue.push(read_of(1, Class::moving_state));
-  queue.push(awaited_read(2, now - 2ms));
-  queue.push(awaited_read(3, now + 1ms));
-  queue.push(awaited_read(4, now - 3ms, Class::idle_state));
+  queue.push(awaited_read(2, now - 2ms, 2));
+  queue.push(awaited_read(3, now + 1ms, 3));
+  queue.push(awaited_read(4, now - 3ms, 4, Class::idle_state));
   queue.push(read_of(5, Class::motion));
   queue.push(read_of(6, Class::motion));
   ASSERT_NE(queue.next_of(Class::motion), nullptr);
@@ -86,34 +87,46 @@ TEST(TransactionQueue, AnAwaitedReadingTakesItsClassBeforeMotionThatCanWait) {
   EXPECT_EQ(pops(now - 3ms), 6) << "nothing is awaited yet";
   queue.push(read_of(7, Class::motion));
   auto first = queue.pop(now);
-  EXPECT_EQ(first->exchange.request.address, 1) << "it came first";
+  EXPECT_EQ(first->exchange.request.address, 2) << "before what came first";
   EXPECT_TRUE(first->reserved) << "motion does not take its place again";
   queue.put_back(std::move(first));
   queue.push(read_of(8, Class::stop));
   EXPECT_EQ(pops(now), 8) << "before everything";
-  EXPECT_EQ(pops(now), 1);
+  EXPECT_EQ(pops(now), 1) << "the other one has had its chance to pass it";
   EXPECT_EQ(pops(now), 2);
   EXPECT_EQ(pops(now), 7) << "the other is awaited later";
   EXPECT_EQ(drain(queue), (std::vector<std::uint16_t>{3, 4}));
 }
 
-/// However many are awaited, again and again.
-TEST(TransactionQueue, AReadingThatIsAwaitedLaterIsNotOvertaken) {
+TEST(TransactionQueue, OfAwaitedReadingsTheOneThatIsAwaitedLongestGoesFirst) {
   TransactionQueue queue;
-  TimePoint now{10s};
-  std::uint16_t address = 100;
-  for (int i = 0; i < 3; ++i) queue.push(awaited_read(++address, now));
-  queue.push(awaited_read(1, now + 10s));
-  int before = 0;
-  for (bool seen = false; !seen; now += 1ms) {
-    queue.push(awaited_read(++address, now));
-    queue.push(read_of(++address, Class::motion));
-    const auto next = queue.pop(now);
-    seen = next->exchange.request.address == 1;
-    before += seen ? 0 : 1;
-    ASSERT_LE(before, 3);
+  const TimePoint now{10s};
+  queue.push(read_of(10, Class::motion));
+  for (const std::uint8_t node : {2, 3, 4}) queue.push(awaited_read(node, now - node * 1ms, node));
+  std::vector<std::uint16_t> order;
+  for (int i = 0; i < 4; ++i) order.push_back(queue.pop(now)->exchange.request.address);
+  EXPECT_EQ(order, (std::vector<std::uint16_t>{4, 3, 2, 10}));
+}
+
+/// However many are awaited, again and again: of each other node one, whether it waited before or came later.
+TEST(TransactionQueue, AReadingIsPassedOnceByEachNode) {
+  for (const bool waits_already : {false, true}) {
+    TransactionQueue queue;
+    TimePoint now{10s};
+    std::uint16_t address = 100;
+    if (waits_already) queue.push(read_of(99, Class::moving_state, TimePoint::max(), 2));
+    queue.push(awaited_read(1, now + 10s));
+    int before = 0;
+    for (bool seen = false; !seen; now += 1ms) {
+      for (const std::uint8_t node : {2, 3, 4}) queue.push(awaited_read(++address, now, node));
+      queue.push(read_of(++address, Class::motion));
+      const auto next = queue.pop(now);
+      seen = next->exchange.request.address == 1;
+      before += seen ? 0 : 1;
+      ASSERT_LE(before, 3);
+    }
+    EXPECT_EQ(before, 3);
   }
-  EXPECT_EQ(before, 3);
 }
 
 /// What is awaited takes nothing from those below: one of eight is theirs all the same.
