@@ -76,18 +76,19 @@ TEST_F(ForeignScan, IsFoundAmongDrivesOfAnotherMaker) {
 std::string file_with(std::string_view axis) {
   return "machine: test\n"
          "buses:\n"
-         "  line-a: {kind: modbus_rtu, port: sim, baud: 115200}\n"
+         "  line-a: {modbus_rtu: {port: sim, baud: 115200}}\n"
          "axes:\n"
          "  feeder:\n"
          "    bus: line-a\n"
          "    node: 1\n"
-         "    model: acme-s1\n" +
+         "    model: acme-s1\n"
+         "    unit: mm\n" +
          std::string(axis);
 }
 
 TEST(ForeignModel, IsConfiguredAsAnyOther) {
   const auto loaded =
-      config::load_text(file_with("    scale: {microstep: 8192, travel: 81.92 mm/rev}\n"
+      config::load_text(file_with("    scale: {microstep: 8192 pulses/rev, travel: 81.92 mm/rev}\n"
                                   "    limits: {position: [0 mm, 400 mm], velocity: 100 mm/s}\n"
                                   "    inputs: {I2: home}\n"),
                         "foreign.yaml");
