@@ -14,7 +14,6 @@ namespace axisd::yako_rtu {
 namespace {
 
 constexpr std::int64_t word = 0xFFFF;
-constexpr std::uint32_t segment_rows = 16;
 
 std::vector<DriveSetting> homing_registers(const HomingProfile& homing) {
   static constexpr std::string_view keys[] = {"method", "velocity", "search_velocity", "acceleration_time",
@@ -87,7 +86,7 @@ std::vector<DriveSetting> silenced_segments(std::span<const DriveSetting> requir
     return found != required.end() && !found->holds(present.at(address));
   };
   std::vector<DriveSetting> silenced;
-  for (std::uint32_t row = 0; row < segment_rows; ++row) {
+  for (std::uint32_t row = 0; row < reg::segment_rows; ++row) {
     const bool changes = differs(reg::terminal_move_mode) || differs(reg::segment_pulses_high + row) ||
                          differs(reg::segment_pulses_low + row) || differs(reg::segment_time + row);
     for (const auto speed : {reg::segment_speed + row, reg::segment_pv_speed + row}) {

@@ -148,7 +148,7 @@ TEST(Configuration, SegmentsAreOwnedWholeButForTimesThatCannotBeWrittenBack) {
 }
 
 TEST(Configuration, ARowThatChangesIsSilencedFirst) {
-  DriveSegments table;
+  DriveSegments table{.rows = std::vector<DriveSegments::Row>(3)};
   table.rows[2] = {.pulses = 1000, .velocity_rpm = 300, .acceleration_time = std::chrono::milliseconds(50)};
   const auto wanted = segment_registers(table, 0b100, true);
   SettingValues present;
