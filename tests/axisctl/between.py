@@ -7,11 +7,20 @@ import grpc
 import grpc.aio
 from google.protobuf import symbol_database
 
-from fake_axis import refuse
+import simulated  # noqa: F401  (makes axisd importable)
+from axisd.v1 import error_pb2
 
 LONG = 3600  # s; of a deadline that nobody set
 
 OPTIONS = (("grpc.http2.min_recv_ping_interval_without_data_ms", 900), ("grpc.http2.max_ping_strikes", 0))
+
+
+async def refuse(context, code, detail, text=None):
+    """Ends the call with the typed detail in the standard trailer."""
+    packed = error_pb2.StatusDetails.Packed(type_url="type.googleapis.com/axisd.v1.ErrorDetail",
+                                            value=detail.SerializeToString())
+    details = error_pb2.StatusDetails(code=code.value[0], message=detail.message, details=[packed])
+    await context.abort(code, text or detail.message, (("grpc-status-details-bin", details.SerializeToString()),))
 
 
 class Open(tuple):
@@ -21,15 +30,18 @@ class Open(tuple):
 class Between(grpc.GenericRpcHandler):
     """`calls`: (method, request, peer) of every call so far. `losing`: of how many calls of a method the answer is lost, after
     it was carried out. `answers`: by method, what is answered in the daemon's place: messages, an ErrorDetail that the call
-    is refused with, or a function from the request to them."""
+    is refused with, or a function from the request to them. `open`: calls that the daemon has not ended."""
 
     def __init__(self, target):
-        self.calls, self.losing, self.answers, self._target = [], {}, {}, target
+        self.calls, self.losing, self.answers, self.open, self._target = [], {}, {}, [], target
+
+    def connect(self):
+        self.channel = grpc.aio.insecure_channel(self._target, options=(
+            ("grpc.use_local_subchannel_pool", 1), ("grpc.enable_http_proxy", 0)))
 
     async def start(self, address="127.0.0.1:0"):
         """Returns the server and its port."""
-        self._channel = grpc.aio.insecure_channel(self._target, options=(
-            ("grpc.use_local_subchannel_pool", 1), ("grpc.enable_http_proxy", 0)))
+        self.connect()
         server = grpc.aio.server(options=OPTIONS)
         server.add_generic_rpc_handlers((self,))
         port = server.add_insecure_port(address)
@@ -44,26 +56,29 @@ class Between(grpc.GenericRpcHandler):
         return [peer for name, _, peer in self.calls if name == method]
 
     def service(self, details):
-        path = details.method
-        service, method = path.strip("/").split("/")
-        symbols = symbol_database.Default()
-        request_type = symbols.GetPrototype(symbols.pool.FindServiceByName(service).methods_by_name[method].input_type)
-
         async def serve(requests, context):
-            request = await anext(aiter(requests), None)
-            if request is None:  # the client has left
-                return
-            self.calls.append((method, request_type.FromString(request), context.peer()))
-            if (answer := self.answers.get(method)) is not None:
-                async for message in self._answer(answer(self.calls[-1][1]) if callable(answer) else answer, context):
-                    yield message
-                return
-            async for message in self._pass_on(path, request, dict(details.invocation_metadata), context):
-                if self.losing.get(method):
-                    self.losing[method] -= 1
-                    await context.abort(grpc.StatusCode.UNAVAILABLE, "the connection was cut")
+            async for message in self.serve(details, requests, context):
                 yield message
         return grpc.stream_stream_rpc_method_handler(serve)
+
+    async def serve(self, details, requests, context):
+        service, method = details.method.strip("/").split("/")
+        symbols = symbol_database.Default()
+        request_type = symbols.GetPrototype(symbols.pool.FindServiceByName(service).methods_by_name[method].input_type)
+        sent = await anext(aiter(requests), None)
+        if sent is None:  # the client has left
+            return
+        request = request_type.FromString(sent)
+        self.calls.append((method, request, context.peer()))
+        if (answer := self.answers.get(method)) is not None:
+            async for message in self._answer(answer(request) if callable(answer) else answer, context):
+                yield message
+            return
+        async for message in self._pass_on(details, sent, context):
+            if self.losing.get(method):
+                self.losing[method] -= 1
+                await context.abort(grpc.StatusCode.UNAVAILABLE, "the connection was cut")
+            yield message
 
     @staticmethod
     async def _answer(answer, context):
@@ -76,13 +91,15 @@ class Between(grpc.GenericRpcHandler):
         if isinstance(answer, Open):
             await asyncio.sleep(LONG)
 
-    async def _pass_on(self, path, request, metadata, context):
+    async def _pass_on(self, details, request, context):
         async def once():
             yield request
         left = context.time_remaining()
-        passed = tuple((key, value) for key, value in metadata.items() if key.startswith("axisd-"))
-        call = self._channel.stream_stream(path)(once(), metadata=passed,
-                                                 timeout=left if left is not None and left < LONG else None)
+        passed = tuple((key, value) for key, value in details.invocation_metadata
+                       if key.startswith("axisd-") and key != "axisd-machine")
+        call = self.channel.stream_stream(details.method)(once(), metadata=passed,
+                                                          timeout=left if left is not None and left < LONG else None)
+        self.open.append(call)
         try:
             async for message in call:
                 yield message
@@ -92,6 +109,7 @@ class Between(grpc.GenericRpcHandler):
             raise asyncio.CancelledError from None
         finally:
             call.cancel()
+            self.open.remove(call)
 
 
 class Threaded:
@@ -122,6 +140,10 @@ class Threaded:
         await self._end.wait()
         for server in servers:
             await server.stop(0)
+        await self._close()
+
+    async def _close(self):
+        """What else there is to close."""
 
     def do(self, coroutine):
         """On the thread of the servers."""
@@ -141,3 +163,6 @@ class Passage(Threaded):
     async def _serve(self):
         server, port = await self.between.start(self._wanted)
         return [server], port
+
+    async def _close(self):
+        await self.between.channel.close()

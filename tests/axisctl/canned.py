@@ -1,6 +1,5 @@
 """Answers that a daemon with simulated drives does not give when a test wants them, and whose figures a test knows."""
-import fake_axis  # noqa: F401  (makes axisd importable)
-from between import Open
+from between import Open  # makes axisd importable
 from google.protobuf import duration_pb2
 from axisd.v1 import (axis_service_pb2 as axis_pb, budget_pb2 as budget_pb, bus_service_pb2 as bus_pb, drive_service_pb2 as drive_pb, error_pb2,
                       event_service_pb2 as event_pb, group_service_pb2 as group_pb, system_service_pb2 as system_pb, types_pb2)

@@ -1,13 +1,12 @@
-"""A cell of fake machines for tests of clients: an entrance that passes calls on as bytes and serves CellService, for what
-real machines do not do when a test wants it: falling silent, answering late, refusing."""
+"""A fake cell of machines with simulated drives, for tests of clients: an entrance that passes calls on as bytes and serves
+CellService, for what real cells do not do when a test wants it: falling silent, answering late, refusing."""
 import asyncio
 
 import grpc
 import grpc.aio
 
-import fake_server  # makes axisd importable
-from between import OPTIONS, Threaded
-from fake_axis import refuse
+import simulated  # makes axisd importable
+from between import OPTIONS, Between, Threaded, refuse
 from axisd.cell.v1 import cell_service_pb2 as pb, cell_service_pb2_grpc as rpc
 from axisd.v1 import error_pb2, system_service_pb2 as system_pb, types_pb2
 
@@ -40,50 +39,58 @@ class Forwarder(grpc.GenericRpcHandler):
                 await asyncio.Event().wait()
             if name in self._cell.silent:
                 await refuse(context, grpc.StatusCode.UNAVAILABLE, silence(name))
-            call = self._cell.channels[name].stream_stream(details.method)(requests)
-            self._cell.open.setdefault(name, []).append(call)
             try:
-                async for message in call:
+                async for message in self._cell.machines[name].serve(details, requests, context):
                     yield message
-            except grpc.aio.AioRpcError as error:
-                await context.abort(error.code(), error.details(), tuple(error.trailing_metadata() or ()))
             except asyncio.CancelledError:
                 if name not in self._cell.silent:
                     raise
                 await refuse(context, grpc.StatusCode.UNAVAILABLE, silence(name))
-            finally:
-                call.cancel()
         return grpc.stream_stream_rpc_method_handler(forward)
 
 
+class Machine(Between):
+    def __init__(self, daemon):
+        super().__init__(daemon.server)
+        self.daemon = daemon
+        self.axes = list(simulated.AXES)
+        self.connect()
+
+    @property
+    def inhibited(self):
+        return self.daemon.client.info().inhibited
+
+    @property
+    def leases(self):
+        return self.daemon.leases()
+
+    def call(self, method, request, response):
+        return self.channel.unary_unary(method, request_serializer=type(request).SerializeToString,
+                                        response_deserializer=response.FromString)(request)
+
+
 class FakeCell(rpc.CellServiceServicer):
-    """`machines`: FakeMachine by name. `silent`: names of those that do not answer; `gone`: of these, those that are not
+    """`machines`: by name. `silent`: names of those that do not answer; `gone`: of these, those that are not
     registered either. `forwarded`: (machine, method).
     `holding`: events by (machine, method) of calls that are never answered, set when one has come. `readers`:
     of events of the cell, so far. `moves`: requests of MoveGroup."""
 
     def __init__(self, names):
-        self.machines = {name: fake_server.FakeMachine() for name in names}
-        self.silent, self.gone, self.forwarded, self.channels, self.open, self.reasons = set(), set(), [], {}, {}, []
+        self.machines = {name: Machine(daemon) for name, daemon in zip(names, simulated.daemons(*names))}
+        self.silent, self.gone, self.forwarded, self.reasons = set(), set(), [], []
         self.changed = asyncio.Condition()
         self.changes, self.events, self.latches = [], [], []
         self.not_shared = None
         self.holding, self.readers, self.moves = {}, 0, []
 
     async def serve(self):
-        """Returns the servers, the entrance's first, and its port."""
+        """Returns the entrance and its port."""
         entrance = grpc.aio.server(options=OPTIONS)
         entrance.add_generic_rpc_handlers((Forwarder(self),))
         rpc.add_CellServiceServicer_to_server(self, entrance)
-        servers = [entrance]
-        for name, machine in self.machines.items():
-            server, port = await fake_server.serve(machine, ["127.0.0.1:0"])
-            servers.append(server)
-            self.channels[name] = grpc.aio.insecure_channel(
-                f"127.0.0.1:{port}", options=(("grpc.use_local_subchannel_pool", 1),))
         port = entrance.add_insecure_port("127.0.0.1:0")
         await entrance.start()
-        return servers, port
+        return [entrance], port
 
     def message(self, name):
         machine = self.machines[name]
@@ -99,7 +106,7 @@ class FakeCell(rpc.CellServiceServicer):
     async def fall_silent(self, name):
         """The machine answers no more, and what is open to it ends."""
         self.silent.add(name)
-        for call in self.open.pop(name, ()):
+        for call in list(self.machines[name].open):
             call.cancel()
         await self.happen(name, "present -> silent: connection refused")
 
@@ -143,10 +150,8 @@ class FakeCell(rpc.CellServiceServicer):
                 continue
             stop.outcome = pb.MACHINE_OUTCOME_DONE
             stop.took.FromNanoseconds(2_000_000)
-            call = self.channels[name].unary_unary(
-                "/axisd.v1.SystemService/StopAll", request_serializer=system_pb.StopAllRequest.SerializeToString,
-                response_deserializer=system_pb.StopAllResponse.FromString)
-            stop.response.CopyFrom(await call(system_pb.StopAllRequest()))
+            stop.response.CopyFrom(await machine.call("/axisd.v1.SystemService/StopAll", system_pb.StopAllRequest(),
+                                                      system_pb.StopAllResponse))
             del stop.response.results[2:]  # without those that cannot stop
         return response
 
@@ -159,7 +164,8 @@ class FakeCell(rpc.CellServiceServicer):
                 release.outcome = pb.MACHINE_OUTCOME_SILENT
                 release.error.CopyFrom(silence(name))
                 continue
-            machine.inhibited = False
+            await machine.call("/axisd.v1.SystemService/ReleaseStopAll", system_pb.ReleaseStopAllRequest(),
+                               system_pb.ReleaseStopAllResponse)
             release.outcome = pb.MACHINE_OUTCOME_DONE
         return response
 
@@ -211,5 +217,9 @@ class ThreadedCell(Threaded):
         self.cell = FakeCell(self._names)
         return await self.cell.serve()
 
+    async def _close(self):
+        for machine in self.cell.machines.values():
+            await machine.channel.close()
+
     def calls(self, machine, method):
-        return [request for name, request, _ in self.cell.machines[machine].calls if name == method]
+        return self.cell.machines[machine].requests(method)

@@ -4,21 +4,24 @@ Axes: `feeder` (mm, soft limits 0 to 400, enabled, homed, at 0), `turntable` (de
 whose drive has no power. Velocities are granted as whole r/min: in steps of 8/3 mm/s.
 """
 import atexit
+import concurrent.futures
 import os
 import pathlib
 import shutil
 import sys
 import tempfile
 
+import grpc
+
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "e2e"))
-from harness.client import Client, axis_pb, group_pb, lease_pb, pb, system_pb  # noqa: E402  (makes axisd importable)
+from harness.client import ENDED, CallFailed, Client, axis_pb, command_pb, group_pb, lease_pb, pb, system_pb  # noqa: E402  (makes axisd importable)
 from harness.machine import PATIENT  # noqa: E402
 from harness.programs import AXISCTL, AXISD, OWN_NAME, Program, run, wait_for  # noqa: E402
 
 AXES = ("feeder", "turntable", "ghost", "sticky")
 SCALE = "    scale: { microstep: 8000 pulses/rev, travel: 160 mm/rev }\n"
 LIMITS = "velocity: 600 mm/s, acceleration_time: 50 ms"
-CONFIG = f"""machine: press-1
+CONFIG = f"""machine: MACHINE
 access:
   roles: {{ "{OWN_NAME}": maintainer }}
   delegates: {{ "{OWN_NAME}": maintainer }}
@@ -66,21 +69,36 @@ groups: {{ transfer: {{ axes: [feeder, turntable] }} }}
 
 
 class Daemon:
-    def __init__(self):
+    """`wait`: until its drives are there."""
+
+    def __init__(self, machine):
         self.directory = pathlib.Path(tempfile.mkdtemp(prefix="axisd-clients-"))
         atexit.register(self.close)
         self.server = f"unix:{self.directory}/axisd.sock"
         config = self.directory / "press.yaml"
         patience = "".join(f"    {key}: {text}\n" for key, text in PATIENT.items())
-        config.write_text(CONFIG.replace("    limits:", f"{patience}    limits:"))
+        config.write_text(CONFIG.replace("MACHINE", machine).replace("    limits:", f"{patience}    limits:"))
         self.program = Program("axisd", [AXISD, "--config", str(config), "--state-directory", str(self.directory / "state"),
                                          "--listen", self.server], self.directory)
-        wait_for(lambda: os.path.exists(self.server.removeprefix("unix:")) or not self.program.running(), "it listens")
-        assert self.program.running(), self.program.log()
-        self.client = Client(self.server)
+
+    def wait(self):
+        wait_for(self._listens, "it listens")
         for axis in AXES:
             self.client.wait_online(axis)
         self.power("ghost", False)
+
+    def _listens(self):
+        assert self.program.running(), self.program.log()
+        if not os.path.exists(self.server.removeprefix("unix:")):
+            return False
+        self.client = Client(self.server)
+        try:
+            return self.client.states()
+        except CallFailed as failed:  # the socket has its name before anybody listens
+            if failed.code != grpc.StatusCode.UNAVAILABLE:
+                raise
+            self.client.close()
+            return False
 
     def simulate(self, *words):
         done = run([AXISCTL, "--server", self.server, "sim", *words])
@@ -97,6 +115,9 @@ class Daemon:
         return self.client.call(self.client.lease.AcquireLease,
                                 lease_pb.AcquireLeaseRequest(axes=axes, take=True)).lease_token
 
+    def leases(self):
+        return list(self.client.call(self.client.lease.ListLeases, lease_pb.ListLeasesRequest()).leases)
+
     def hold(self, axis, request_id, user=None):
         """As another program does, or another user."""
         self.client.axis.Stop(axis_pb.StopRequest(axis=axis, hold=True, options={"request_id": request_id}),
@@ -107,7 +128,7 @@ class Daemon:
         call = self.client.call
         if self.client.info().inhibited:
             call(self.client.system.ReleaseStopAll, system_pb.ReleaseStopAllRequest())
-        if call(self.client.lease.ListLeases, lease_pb.ListLeasesRequest()).leases:
+        if self.leases():
             call(self.client.lease.ReleaseLease, lease_pb.ReleaseLeaseRequest(lease_token=self.take(*AXES)))
         states = {state.axis: state for state in self.client.states()}
         held = [name for name, state in states.items() if state.holds]
@@ -117,31 +138,50 @@ class Daemon:
             self._rest(name, states[name], powered=name != "turntable")
         feeder = states["feeder"]
         if feeder.trust != pb.POSITION_TRUST_HOMED:
-            self.client.to_done("Home", "feeder")
+            self._do("Home", "feeder")
         if self.client.state("feeder").position != 0:
-            self.client.to_done("MoveAbsolute", "feeder", position=0.0)
+            self._do("MoveAbsolute", "feeder", position=0.0)
+
+    def _do(self, name, axis, **fields):
+        """To its end, once what a test has left undone has ended."""
+        def done():
+            try:
+                return self.client.to_done(name, axis, **fields)
+            except CallFailed as failed:
+                if failed.reason != "REASON_BUSY":
+                    raise
+                return None
+        wait_for(done, f"{name} of {axis}")
+
+    def _busy(self, state):
+        if state.state not in (pb.STATE_STANDSTILL, pb.STATE_DISABLED, pb.STATE_ERROR_STOP):
+            return True
+        return state.command_id and self.client.call(self.client.command.GetCommand,
+                                command_pb.GetCommandRequest(id=state.command_id)).command.state not in ENDED
 
     def _rest(self, name, state, powered):
-        if state.moving or state.state not in (pb.STATE_STANDSTILL, pb.STATE_DISABLED, pb.STATE_ERROR_STOP):
-            self.client.to_done("Stop", name)
-        if self.client.state(name).state == pb.STATE_ERROR_STOP:
-            self.client.to_done("Reset", name)
+        if state.moving or self._busy(state):
+            self._do("Stop", name)
+            state = self.client.state(name)
+        if state.state == pb.STATE_ERROR_STOP:
+            self._do("Reset", name)
         if state.enabled != powered or not state.enabled_by_daemon and powered:
-            self.client.to_done("Enable" if powered else "Disable", name)
+            self._do("Enable" if powered else "Disable", name)
 
     def close(self):
-        self.client.close()
-        self.program.terminate()
+        self.program.kill()  # its end would wait for the stop that it owes the ghost
         self.program.check_memory()
         shutil.rmtree(self.directory, ignore_errors=True)
 
 
-_daemons = []
+_daemons = {}
 
 
-def daemon():
-    """The one of this file of tests, in order."""
-    if not _daemons:
-        _daemons.append(Daemon())
-    _daemons[0].put_in_order()
-    return _daemons[0]
+def daemons(*machines):
+    """Those of this file of tests, in order."""
+    new = [name for name in machines if name not in _daemons]
+    _daemons.update({name: Daemon(name) for name in new})
+    with concurrent.futures.ThreadPoolExecutor() as each:
+        list(each.map(Daemon.wait, [_daemons[name] for name in new]))
+        list(each.map(Daemon.put_in_order, [_daemons[name] for name in machines]))
+    return [_daemons[name] for name in machines]

@@ -10,8 +10,7 @@ import time
 import unittest
 
 import between
-import fake_server  # makes axisd importable
-import simulated
+import simulated  # makes axisd importable
 import axisd
 
 AXISCTL = os.environ["AXISCTL"]  # set by CTest
@@ -24,13 +23,14 @@ def environment():
     return kept | {"TERM": "xterm"}
 
 
-class SimulatedPythonTest(unittest.IsolatedAsyncioTestCase):
+class PythonTest(unittest.IsolatedAsyncioTestCase):
     """The Python package's connection to a daemon with simulated drives, and what is between them."""
 
     async def asyncSetUp(self):
-        self.daemon = simulated.daemon()
+        (self.daemon,) = simulated.daemons("press-1")
         self.between = between.Between(self.daemon.server)
         self.server, port = await self.between.start()
+        self.addAsyncCleanup(self.between.channel.close)
         self.addAsyncCleanup(self.server.stop, 0)
         self.machine = await self.enterAsyncContext(axisd.connect(f"127.0.0.1:{port}"))
         self.feeder = self.machine.axis("feeder")
@@ -39,23 +39,12 @@ class SimulatedPythonTest(unittest.IsolatedAsyncioTestCase):
         return self.between.requests(method)
 
 
-class PythonTest(unittest.IsolatedAsyncioTestCase):
-    """Each test has a fake machine of its own, and the Python package's connection to it."""
-
-    async def asyncSetUp(self):
-        self.fake = fake_server.FakeMachine()
-        server, port = await fake_server.serve(self.fake, ["127.0.0.1:0"])
-        self.addAsyncCleanup(server.stop, 0)
-        self.machine = await self.enterAsyncContext(axisd.connect(f"127.0.0.1:{port}"))
-
-
 class AxisctlTest(unittest.TestCase):
-    """Each test has a fake daemon of its own."""
+    """axisctl, a daemon with simulated drives, and what is between them."""
 
     def setUp(self):
-        server = fake_server.ThreadedServer()
-        self.server = server.__enter__()
-        self.addCleanup(server.__exit__)
+        (self.daemon,) = simulated.daemons("press-1")
+        self.server = self.enterContext(between.Passage(self.daemon.server))
 
     def run_axisctl(self, *words, server=None, env=None):
         return subprocess.run([AXISCTL, "--server", server or self.server.address, *words], capture_output=True,
@@ -88,14 +77,6 @@ class AxisctlTest(unittest.TestCase):
 
     def on_terminal(self, *words, interrupt_at=None, env=None):
         return on_terminal(self, [AXISCTL, "--server", self.server.address, *words], interrupt_at, env)
-
-
-class SimulatedAxisctlTest(AxisctlTest):
-    """Against a daemon with simulated drives."""
-
-    def setUp(self):
-        self.daemon = simulated.daemon()
-        self.server = self.enterContext(between.Passage(self.daemon.server))
 
 
 def on_terminal(test, command, interrupt_at=None, env=None):

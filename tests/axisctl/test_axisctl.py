@@ -13,12 +13,12 @@ import unittest.mock
 
 import canned  # makes axisd importable
 from harness.programs import OWN_NAME
-from support import AXISCTL, LIMIT, AxisctlTest, SimulatedAxisctlTest, environment
+from support import AXISCTL, LIMIT, AxisctlTest, environment
 
 ID = r"[0-9a-f]+-\d+"  # of a command
 
 
-class Reading(SimulatedAxisctlTest):
+class Reading(AxisctlTest):
     def test_list_is_an_aligned_table_that_shows_simulated(self):
         lines = self.ok("list").splitlines()
         self.assertRegex(lines[0], r"^AXIS +STATE +POSITION")
@@ -29,7 +29,7 @@ class Reading(SimulatedAxisctlTest):
         self.assertNotIn("\x1b", "".join(lines))
 
     def test_json_of_several_axes_is_one_object(self):
-        for wait in ([], ["--wait"]):
+        for wait in (["--wait"], []):
             (listed,) = self.json("enable", "feeder", "turntable", *wait)
             self.assertEqual([command["axis"] for command in listed["commands"]], ["feeder", "turntable"])
         done = self.run_axisctl("--json", "stop", "nobody", "feeder")
@@ -130,7 +130,7 @@ class Reading(SimulatedAxisctlTest):
         self.assertNotIn("not heeded", self.ok("whoami"))
 
 
-class Motion(SimulatedAxisctlTest):
+class Motion(AxisctlTest):
     def test_move_prints_id_state_and_what_was_granted_differently(self):
         text = self.ok("move", "feeder", "120mm", "--velocity", "50mm/s", "--acceleration-time", "150ms",
                        "--deceleration-time", "0.2s")
@@ -238,7 +238,7 @@ class Motion(SimulatedAxisctlTest):
         self.assertRegex(done.stdout, "MoveVelocity  Aborted after .*: the hold was not renewed in time")
 
 
-class Jogging(SimulatedAxisctlTest):
+class Jogging(AxisctlTest):
     def test_jog_renews_and_halts_when_its_time_is_over(self):
         text = self.ok("jog", "feeder", "30mm/s", "--hold", "300ms", "--for", "1s")
         self.assertRegex(text, r"(?s)feeder  Jog  .*feeder  Halt  Done")
@@ -270,7 +270,7 @@ class Jogging(SimulatedAxisctlTest):
         self.assertIn("permitted 30ms to 2s", self.fails(2, "jog", "feeder", "1", "--hold", "3s"))
 
 
-class Stopping(SimulatedAxisctlTest):
+class Stopping(AxisctlTest):
     def test_stops_ask_nothing_before(self):
         for words, method in ((["halt"], "Halt"), (["stop"], "Stop"), (["quick-stop"], "QuickStop")):
             self.assertRegex(self.ok(*words, "feeder"), rf"feeder  {method}  (Active|Done)")
@@ -344,7 +344,7 @@ class Stopping(SimulatedAxisctlTest):
         self.assertIn("not both", self.fails(2, "stop", "feeder", "--all"))
 
 
-class Commands(SimulatedAxisctlTest):
+class Commands(AxisctlTest):
     def test_get_watch_cancel(self):
         moved = self.json("move", "feeder", "390", "--velocity", "9")[0]["id"]
         self.assertRegex(self.ok("command", "get", moved), rf"^{moved}  feeder  MoveAbsolute  Active")
@@ -360,7 +360,7 @@ class Commands(SimulatedAxisctlTest):
         self.assertIn("no command", self.fails(4, "command", "watch", "c-9"))
 
 
-class Connecting(SimulatedAxisctlTest):
+class Connecting(AxisctlTest):
     def test_unix_socket_and_environment(self):
         done = subprocess.run([AXISCTL, "list", "--names"], capture_output=True, text=True, timeout=LIMIT,
                               env=environment() | {"AXISD_SERVER": self.daemon.server}, check=False)
@@ -459,7 +459,7 @@ class Offline(AxisctlTest):
         self.assertRegex(self.ok("--version"), r"^axisctl \d")
 
 
-class Completion(SimulatedAxisctlTest):
+class Completion(AxisctlTest):
     def complete(self, *words):
         script = ('eval "$("$AXISCTL" completion bash)"; COMP_WORDS=("$AXISCTL" "$@"); COMP_CWORD=$#; _axisctl; '
                   'printf "%s\\n" "${COMPREPLY[@]}"')

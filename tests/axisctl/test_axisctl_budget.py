@@ -6,14 +6,14 @@ import tempfile
 import unittest
 
 import canned
-from support import AxisctlTest, SimulatedAxisctlTest
+from support import AxisctlTest
 
 SOURCE = pathlib.Path(__file__).parents[2]
 DEMO = str(SOURCE / "config/examples/demo.yaml")
 EXCEEDED = SOURCE / "tests/broken/budget.yaml"
 
 
-class OfTheDaemon(SimulatedAxisctlTest):
+class OfTheDaemon(AxisctlTest):
     def test_predicted_beside_seen(self):
         self.assertRegex(self.ok("budget"), r"(?s)^line-a\nMOVING +UTILISATION.*\nfeeder +alone .*\nline-b\n")
         self.server.answers |= {"GetBudget": canned.BUDGET, "ListGroups": canned.GROUPS}

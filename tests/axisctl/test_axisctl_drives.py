@@ -7,11 +7,11 @@ import unittest
 
 import canned  # makes axisd importable
 from between import Open
-from support import SimulatedAxisctlTest
+from support import AxisctlTest
 from axisd.v1 import drive_service_pb2
 
 
-class Drives(SimulatedAxisctlTest):
+class Drives(AxisctlTest):
     def test_statistics_of_each_kind_of_bus(self):
         self.assertRegex(self.ok("bus", "statistics"), r"(?m)^ +1  feeder +\d")
         self.server.answers["GetBusStatistics"] = canned.STATISTICS
@@ -186,7 +186,7 @@ class Drives(SimulatedAxisctlTest):
         self.assertRegex(self.ok("list"), r"turntable .*started by a terminal, drift: X1 has no function")
 
 
-class Buses(SimulatedAxisctlTest):
+class Buses(AxisctlTest):
     def test_a_scan_finds_the_drives(self):
         self.assertRegex(self.ok("bus", "scan", "line-a", "--nodes", "1-3"), r"\n +2 +115200 +8N1 +ykd2405pr +V1\.0 +10000 +turntable\n")
 
@@ -300,7 +300,7 @@ class Buses(SimulatedAxisctlTest):
         self.assertIn("bar", self.fails(2, "device", "write", "valves", "pressure", "3mm"))
 
 
-class Events(SimulatedAxisctlTest):
+class Events(AxisctlTest):
     def test_all_that_are_kept(self):
         self.server.answers["WatchEvents"] = canned.EVENTS
         lines = self.ok("events").splitlines()
@@ -330,7 +330,7 @@ class Events(SimulatedAxisctlTest):
         self.assertEqual(status, 0, shown)
 
 
-class Help(SimulatedAxisctlTest):
+class Help(AxisctlTest):
     def test_every_command_has_help(self):
         for group in ("drive", "bus", "device"):
             text = self.ok(group, "--help")

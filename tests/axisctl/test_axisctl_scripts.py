@@ -8,10 +8,10 @@ import tempfile
 import unittest
 import xml.etree.ElementTree as ElementTree
 
-from support import AXISCTL, LIMIT, AxisctlTest, SimulatedAxisctlTest, environment
+from support import AXISCTL, LIMIT, AxisctlTest, environment
 
 
-class FileTest(SimulatedAxisctlTest):
+class FileTest(AxisctlTest):
     def setUp(self):
         super().setUp()
         folder = tempfile.TemporaryDirectory()

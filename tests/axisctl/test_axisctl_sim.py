@@ -4,7 +4,7 @@ import threading
 import unittest
 import uuid
 
-from support import SimulatedAxisctlTest  # makes axisd importable
+from support import AxisctlTest  # makes axisd importable
 from axisd.v1 import system_service_pb2 as system_pb
 
 
@@ -32,7 +32,7 @@ class SimulatedDrives:
                     stream.flush()
 
 
-class Sim(SimulatedAxisctlTest):
+class Sim(AxisctlTest):
     def setUp(self):
         super().setUp()
         instance = str(uuid.uuid4())

@@ -1,10 +1,10 @@
 """Why an axis cannot move: axisctl explain and Axis.explain() against the daemon with simulated drives."""
 import unittest
 
-from support import SimulatedAxisctlTest, SimulatedPythonTest
+from support import AxisctlTest, PythonTest
 
 
-class Axisctl(SimulatedAxisctlTest):
+class Axisctl(AxisctlTest):
     def test_nothing_in_the_way(self):
         self.assertEqual(self.ok("explain", "feeder"), "feeder: motion is permitted now\n")
         self.assertEqual(self.ok("explain", "feeder", "move", "120mm", "--velocity", "50mm/s"),
@@ -47,7 +47,7 @@ class Axisctl(SimulatedAxisctlTest):
         self.assertIn("no axis 'nobody'", self.fails(4, "explain", "nobody"))
 
 
-class Python(SimulatedPythonTest):
+class Python(PythonTest):
     def question(self):
         return self.calls("Explain")[-1]
 

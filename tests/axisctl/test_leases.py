@@ -7,7 +7,7 @@ import unittest
 from unittest import mock
 
 from between import Between
-from support import AXISCTL, LIMIT, SimulatedAxisctlTest, SimulatedPythonTest, environment
+from support import AXISCTL, LIMIT, AxisctlTest, PythonTest, environment
 import axisd
 
 from harness.programs import OWN_NAME
@@ -16,7 +16,7 @@ SHOW = ("import os, sys, time; print(os.environ['AXISD_LEASE'], os.environ['AXIS
         "time.sleep(float(sys.argv[1])); sys.exit(int(sys.argv[2]))")
 
 
-class Axisctl(SimulatedAxisctlTest):
+class Axisctl(AxisctlTest):
     def test_acquire_prints_the_token_alone(self):
         token = self.ok("lease", "acquire", "feeder", "turntable", "--ttl", "20s", "--label", "panel 2").strip()
         self.assertRegex(token, r"^\d+$")
@@ -82,7 +82,7 @@ class Axisctl(SimulatedAxisctlTest):
         self.assertEqual(len(self.server.calls("ReleaseLease")), 1)
 
 
-class Python(SimulatedPythonTest):
+class Python(PythonTest):
     async def test_commands_inside_carry_the_token(self):
         async with self.machine.lease("feeder", "turntable", ttl=3, label="cell 4") as lease:
             self.assertEqual((lease.info.axes, lease.info.label, lease.info.ttl), (("feeder", "turntable"), "cell 4", 3))

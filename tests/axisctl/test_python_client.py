@@ -12,13 +12,13 @@ import unittest
 import canned  # makes axisd importable
 from between import Open
 from harness.programs import OWN_NAME
-from support import SimulatedPythonTest
+from support import PythonTest
 import axisd
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 
 
-class ClientTest(SimulatedPythonTest):
+class ClientTest(PythonTest):
     def peers(self, method):
         return set(self.between.peers(method))
 

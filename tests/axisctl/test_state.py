@@ -9,7 +9,7 @@ import unittest
 import simulated  # noqa: F401  (makes axisd and the harness importable)
 from between import Open
 from harness.programs import OWN_NAME
-from support import SimulatedAxisctlTest, SimulatedPythonTest
+from support import AxisctlTest, PythonTest
 import axisd
 from axisd.v1 import error_pb2, event_service_pb2 as event_pb, system_service_pb2 as pb, types_pb2
 
@@ -46,7 +46,7 @@ def convict(answers, storage_error=None):
                 "MoveAbsolute": refusal, "AcceptState": accept}
 
 
-class Axisctl(SimulatedAxisctlTest):
+class Axisctl(AxisctlTest):
     def test_all_is_well(self):
         self.assertRegex(self.ok("state"), r"state\.v1: .*\njournal\.v1: .*\n(.*\n)*accepted: +yes")
         self.server.answers["GetState"] = pb.GetStateResponse(files=FILES)
@@ -134,7 +134,7 @@ class Axisctl(SimulatedAxisctlTest):
         self.assertIn("commands:   the latch would not outlive a restart; free space on the disk\n", self.ok("state"))
 
 
-class Python(SimulatedPythonTest):
+class Python(PythonTest):
     async def test_what_is_wrong_until_it_is_accepted(self):
         self.assertTrue((await self.machine.state()).accepted)
         self.assertEqual(await self.machine.accept_state(), [])

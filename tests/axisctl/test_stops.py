@@ -4,7 +4,7 @@ import subprocess
 import unittest
 
 from between import Passage
-from support import AXISCTL, LIMIT, SimulatedAxisctlTest, SimulatedPythonTest, environment  # makes axisd importable
+from support import AXISCTL, LIMIT, AxisctlTest, PythonTest, environment  # makes axisd importable
 import axisd
 from axisd.v1 import error_pb2, group_service_pb2 as group_pb, types_pb2
 
@@ -14,7 +14,7 @@ UNCONFIRMED = error_pb2.ErrorDetail(reason=error_pb2.REASON_NOT_CONFIRMED, messa
                                     remedy="look at the machine")
 
 
-class ClientTest(SimulatedPythonTest):
+class ClientTest(PythonTest):
     def request_ids(self, method):
         return [request.options.request_id for request in self.calls(method)]
 
@@ -247,7 +247,7 @@ class Reasons(ClientTest):
         self.assertEqual(raised.exception.reason, "soft_limit")
 
 
-class CommandLine(SimulatedAxisctlTest):
+class CommandLine(AxisctlTest):
     def ids(self, method):
         return [request.options.request_id for request in self.server.calls(method)]
 

@@ -27,15 +27,15 @@ if(AXISD_GRPC)
            COMMAND ${AXISD_PYTHON} -B ${CMAKE_SOURCE_DIR}/tests/axisctl/test_state.py)
   add_test(NAME clients.tls_trouble
            COMMAND ${AXISD_PYTHON} -B ${CMAKE_SOURCE_DIR}/tests/axisctl/test_tls_trouble.py)
-  add_test(NAME axisctl.cell_of_fake_machines
+  add_test(NAME axisctl.fake_cell
            COMMAND ${AXISD_PYTHON} -B ${CMAKE_SOURCE_DIR}/tests/axisctl/test_axisctl_cell.py)
-  add_test(NAME python_client.cell_of_fake_machines
+  add_test(NAME python_client.fake_cell
            COMMAND ${AXISD_PYTHON} -B ${CMAKE_SOURCE_DIR}/tests/axisctl/test_python_cell.py)
   add_test(NAME python_client.package
            COMMAND ${AXISD_PYTHON} -B ${CMAKE_SOURCE_DIR}/tests/axisctl/test_python_package.py)
-  # Most of them run against axisd with simulated drives.
-  set_tests_properties(axisctl.budgets axisctl.cell_of_fake_machines axisctl.commands axisctl.drives axisctl.scripts_and_plots
+  # They run against axisd with simulated drives.
+  set_tests_properties(axisctl.budgets axisctl.fake_cell axisctl.commands axisctl.drives axisctl.scripts_and_plots
                        axisctl.simulated_drives clients.explain clients.leases clients.state clients.stops clients.tls_trouble
-                       python_client.cell_of_fake_machines python_client.commands python_client.package PROPERTIES
+                       python_client.fake_cell python_client.commands python_client.package PROPERTIES
                        ENVIRONMENT "AXISCTL=$<TARGET_FILE:axisctl>;AXISD=$<TARGET_FILE:axisd>;AXISD_SIM=$<TARGET_FILE:axisd-sim>" TIMEOUT 600)
 endif()
