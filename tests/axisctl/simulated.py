@@ -36,7 +36,7 @@ axes:
     model: ykd2405pr
     unit: mm
 {SCALE}    limits: {{ position: [0, 400], {LIMITS} }}
-    homing: {{ method: home_negative, velocity: 300 mm/s, search_velocity: 30 mm/s, max_travel: 2000 mm, backoff: 20 mm }}
+    homing: {{ method: home_negative, velocity: 300 mm/s, search_velocity: 30 mm/s, max_travel: 2000 mm, backoff: 25 mm }}
     inputs: {{ X0: home }}
     jog_travel: 200 mm
     simulate: {{ home_switch: -20, home_width: 20, start_position: 10 }}
