@@ -292,10 +292,14 @@ bool RtuBus::can_wait(const Transaction& motion, TimePoint now) const {
   const auto& line = settings_.serial();
   const auto wire =
       wire_time(line, longest_reading + exchange.frame.size() + reply_size(exchange.request) + size_of_write);
-  const auto* const first = queue_.next_of(TransactionClass::moving_state);
-  const auto latest = std::max(turnaround_max(exchange.request.node),
-                               first == nullptr ? Duration{} : first->exchange.turnaround_max);
-  return now + wire + 6 * silence(line) + latest < until;
+  const auto leaves_time = [&](Duration turnaround) {
+    return now + wire + 6 * silence(line) + std::max(turnaround_max(exchange.request.node), turnaround) <
+           until;
+  };
+  // Whichever of the readings goes first.
+  return leaves_time({}) && queue_.all_of(TransactionClass::moving_state, [&](const Transaction& reading) {
+    return leaves_time(reading.exchange.turnaround_max);
+  });
 }
 
 void RtuBus::arm_next() {
