@@ -1,11 +1,28 @@
 #include "devices/axis/saved_position.hpp"
 
 #include <memory>
+#include <string>
 #include <utility>
 
 #include "devices/axis/restart_mark.hpp"
 
 namespace axisd {
+
+namespace {
+
+/// What an earlier run kept, and this one has not proven yet, still finds a restart of the drive (M1). False:
+/// there is nothing.
+bool distrust_earlier(Persistence& kept, const std::string& axis) {
+  const auto& axes = kept.current().axes;
+  const auto found = axes.find(axis);
+  if (found == axes.end() || !found->second.offset || found->second.offset->canary.empty()) return false;
+  auto record = *found->second.offset;
+  record.trust = PositionTrust::unknown;
+  kept.save_offset(axis, std::move(record), {});
+  return true;
+}
+
+}  // namespace
 
 OffsetRecord SavedPosition::offset_record(std::int64_t offset, PositionTrust trust) const {
   // The record speaks of the 32-bit counter: unwrapping begins anew with each start of the daemon.
@@ -45,8 +62,10 @@ void SavedPosition::correct_saved_position() {
 
 void SavedPosition::void_saved_position() {
   if (context_.env.persistence == nullptr) return;
-  forget_position(*context_.env.persistence, context_.settings.name,
-                  power_.state() == PowerMachine::State::restarted);
+  const bool restarted = power_.state() == PowerMachine::State::restarted;
+  if (!owns_canary_ && !restarted && distrust_earlier(*context_.env.persistence, context_.settings.name))
+    return;
+  forget_position(*context_.env.persistence, context_.settings.name, restarted);
   const bool closing = life_.state() == AxisLife::State::closing;
   if (closing)
     keep_canary(PositionTrust::unknown);  // retired, the axis that comes after it goes by the record

@@ -161,15 +161,7 @@ TEST(M01, ARestartedDriveIsNotGivenToAnotherAxisBeforeItIsEnabled) {
   EXPECT_TRUE(rig.axis().check_exchange(true).empty());
 }
 
-/// The drive was switched off when its axis was exchanged, and comes back energised.
-TEST(M01, ARestartBehindAnExchangeOfTheAxisIsNoticed) {
-  Rig rig({.persistence = true, .journal = true});
-  rig.enable();
-  rig.drive->advance(rig.world.now());
-  rig.drive->set_power(false);
-  ASSERT_TRUE(rig.run_until([&] { return rig.state()->link == LinkState::offline; }, 20s));
-  auto wanted = rig.configuration;
-  wanted.axes.at(0).axis.limits.velocity = 50;
+void exchange(Rig& rig, const config::Configuration& wanted) {
   bool through = false;
   rig.machine->reload({.client = "fitter",
                        .configuration = wanted,
@@ -179,6 +171,18 @@ TEST(M01, ARestartBehindAnExchangeOfTheAxisIsNoticed) {
                         through = true;
                       });
   ASSERT_TRUE(rig.run_until([&] { return through; }, 5s));
+}
+
+/// The drive was switched off when its axis was exchanged, and comes back energised.
+TEST(M01, ARestartBehindAnExchangeOfTheAxisIsNoticed) {
+  Rig rig({.persistence = true, .journal = true});
+  rig.enable();
+  rig.drive->advance(rig.world.now());
+  rig.drive->set_power(false);
+  ASSERT_TRUE(rig.run_until([&] { return rig.state()->link == LinkState::offline; }, 20s));
+  auto wanted = rig.configuration;
+  wanted.axes.at(0).axis.limits.velocity = 50;
+  exchange(rig, wanted);
   rig.drive->advance(rig.world.now());
   rig.drive->set_power(true);
   rig.reconnect();
@@ -186,6 +190,32 @@ TEST(M01, ARestartBehindAnExchangeOfTheAxisIsNoticed) {
   const auto refused = rig.try_submit(MoveRelativeRequest{.distance = 1});
   ASSERT_FALSE(refused);
   EXPECT_THAT(refused.error().message, HasSubstr("switched off and on"));
+}
+
+/// Also where this run of the daemon has not heard the drive yet, and the exchange costs the position.
+TEST(M01, ARestartBehindAnExchangeBeforeTheDriveWasHeardIsNoticed) {
+  for (const bool positioned : {false, true}) {
+    SCOPED_TRACE(positioned);
+    Rig rig({.persistence = true, .journal = true});
+    positioned ? rig.ready() : rig.enable();
+    rig.stop_daemon();
+    rig.drive->advance(rig.world.now());
+    rig.drive->set_power(false);
+    rig.start_daemon(false);
+    rig.run(3s);
+    ASSERT_EQ(rig.state()->link, LinkState::offline);
+    auto wanted = rig.configuration;
+    wanted.axes.at(0).axis.scale.invert = true;
+    exchange(rig, wanted);
+    rig.drive->advance(rig.world.now());
+    rig.drive->set_power(true);
+    rig.reconnect();
+    ASSERT_TRUE(rig.state()->enabled);
+    EXPECT_EQ(rig.state()->trust, PositionTrust::unknown);
+    const auto refused = rig.try_submit(MoveRelativeRequest{.distance = 1});
+    ASSERT_FALSE(refused);
+    EXPECT_THAT(refused.error().message, HasSubstr("switched off and on"));
+  }
 }
 
 /// What had proven that the drive kept its memory is kept until there is something newer that does, also
