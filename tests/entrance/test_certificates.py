@@ -1,5 +1,4 @@
 """Who calls an entrance, by certificates; whom machines are told of; certificates that are replaced."""
-import pathlib
 import re
 import shutil
 import time
@@ -197,7 +196,7 @@ class CertificatesOfCallers(CellScenario):
         self.authority.issue("cell.hall-1", days=90)
         self.put("cell.hall-1")
         wait_for(lambda: left()["axisd.tls.certificate"] > 80, "the figure is that of the new one")
-        (pathlib.Path(self.one.directory) / "own.crt").write_text("nothing")
+        self.authority.issue("server", days=-1)
         wait_for(lambda: any("what was used before stays" in each for each in self.events_of_certificates(anna)),
                  "files that cannot be used are told")
 
