@@ -185,7 +185,7 @@ async def main():
 asyncio.run(main())' || die "the Python client does not work"
 
 step "the entrance of a cell"
-inside dpkg -i /packages/axisd-cell_*.deb >"$scratch/log" 2>&1 || { cat "$scratch/log"; die "dpkg -i failed"; }
+inside dpkg -i "/packages/$(basename "$(one axisd-cell)")" >"$scratch/log" 2>&1 || { cat "$scratch/log"; die "dpkg -i failed"; }
 [ ! -e "$root/run/axisd-cell.pid" ] || die "installing it started it"
 inside deb-systemd-invoke start axisd-cell.service
 entrance() { inside axisctl --timeout 20s --server localhost:7445 "$@"; }
@@ -203,7 +203,7 @@ grep -q '^axisd-cell: restarting the entrance' "$scratch/log" || { cat "$scratch
 eventually entrance list
 second=$(pid_of axisd-cell)
 sed -i 's/^listen: /lisen: /' "$root/etc/axisd/cell.yaml"
-inside dpkg -i /packages/axisd-cell_*.deb >"$scratch/log" 2>&1 || { cat "$scratch/log"; die "the downgrade failed"; }
+inside dpkg -i "/packages/$(basename "$(one axisd-cell)")" >"$scratch/log" 2>&1 || { cat "$scratch/log"; die "the downgrade failed"; }
 grep -q 'goes on running' "$scratch/log" || { cat "$scratch/log"; die "nothing was said of its configuration"; }
 [ "$(pid_of axisd-cell)" = "$second" ] && kill -0 "$second" || die "it was restarted all the same"
 sed -i 's/^lisen: /listen: /' "$root/etc/axisd/cell.yaml"
