@@ -63,8 +63,11 @@ void Axis::retire(bool position_holds) {
   if (context_.terminal_may_void_position() || !position_holds) readings_.lose_trust();
   if (!position_holds) saved_.void_saved_position();
   saved_.remember_position();
-  // By this the axis that comes after it finds a restart of the drive, also where there is no position (M1).
-  if (shaft_.tracker().trust() == PositionTrust::unknown) saved_.keep_canary(PositionTrust::unknown);
+  // By the canary the axis that comes after it finds a restart of the drive, also where there is no position
+  // (M1). A configuration that is under way may still write another one: then none is kept.
+  const bool being_replaced = sequences_.life().answered() && !connection_.link().is_configured();
+  if (shaft_.tracker().trust() == PositionTrust::unknown)
+    being_replaced ? saved_.drop_canary() : saved_.keep_canary(PositionTrust::unknown);
   close();
   context_.env.bus->port_changed().notify_all();  // whoever waits for the port looks again
 }

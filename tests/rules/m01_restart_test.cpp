@@ -218,6 +218,25 @@ TEST(M01, ARestartBehindAnExchangeBeforeTheDriveWasHeardIsNoticed) {
   }
 }
 
+/// Also where an exchange ends the one before it in the midst of a configuration.
+TEST(M01, ADriveThatKeptItsPowerMayMoveAfterExchangesThatFollowEachOther) {
+  for (auto at = 0ms; at <= 100ms; ++at) {
+    SCOPED_TRACE(at.count());
+    Rig rig({.persistence = true, .journal = true});
+    rig.enable();
+    for (const auto velocity : {50, 60}) {
+      auto wanted = rig.configuration;
+      wanted.axes.at(0).axis.limits.velocity = velocity;
+      exchange(rig, wanted);
+      rig.configuration = wanted;
+      rig.run(velocity == 50 ? at : 0ms);
+    }
+    rig.reconnect();
+    const auto moved = rig.try_submit(MoveRelativeRequest{.distance = 1});
+    ASSERT_TRUE(moved) << moved.error().message;
+  }
+}
+
 /// What had proven that the drive kept its memory is kept until there is something newer that does, also
 /// where a run of the daemon never gets as far as to use the drive.
 TEST(M01, ARestartBehindARunThatCouldNotConfigureIsNoticed) {
