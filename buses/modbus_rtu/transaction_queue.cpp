@@ -193,11 +193,6 @@ void TransactionQueue::note_passing(const Transaction& gone) {
   for (const auto& one : lane(TransactionClass::moving_state)) one->passed_by.set(gone.exchange.request.node);
 }
 
-const Transaction* TransactionQueue::next_of(TransactionClass transaction_class) const {
-  const auto& waiting = lanes_.at(static_cast<std::size_t>(transaction_class));
-  return waiting.empty() ? nullptr : waiting.begin()->get();
-}
-
 bool TransactionQueue::all_of(TransactionClass transaction_class,
                               const std::function<bool(const Transaction&)>& holds) const {
   return std::ranges::all_of(lanes_.at(static_cast<std::size_t>(transaction_class)),

@@ -73,8 +73,6 @@ class TransactionQueue {
   TransactionPtr pop(std::optional<TimePoint> awaited_by = {});
   /// The next one of class `lowest` or above, or nullptr; nothing goes before its turn.
   TransactionPtr pop(TransactionClass lowest);
-  /// The next one of its class, or nullptr.
-  [[nodiscard]] const Transaction* next_of(TransactionClass transaction_class) const;
   /// `holds` says so of all that pop() might give out of that class.
   [[nodiscard]] bool all_of(TransactionClass transaction_class,
                             const std::function<bool(const Transaction&)>& holds) const;
