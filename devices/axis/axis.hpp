@@ -76,8 +76,6 @@ class Axis {
   [[nodiscard]] std::int64_t way_of(const Plan& plan) const;
 
   Result<CommandPtr> submit(const Action& action, const CommandOptions& options);
-  /// Nobody holds it in Stopping.
-  [[nodiscard]] bool unheld() const { return !stopper_.machine().held(); }
   /// The newest stop; nullptr: there was none.
   [[nodiscard]] const CommandPtr& last_stop() const { return stopper_.machine().last(); }
   /// Everything that stands in the way of a request now: submit() would refuse it with the first that blocks
