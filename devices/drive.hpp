@@ -91,7 +91,8 @@ class Drive {
   Task<Result<std::unique_ptr<LoadedMove>>> load_move(MoveProfile profile, MotionGuard guard);
   Task<Result<std::unique_ptr<PreparedMove>>> prepare_move(MoveProfile profile, MotionGuard guard);
   [[nodiscard]] std::string_view no_common_start() const;
-  /// Else nothing is known, and a restart of the daemon finds every drive restarted.
+  /// Else nothing is known: a restart of the daemon restores no position, and no restart of the drive is
+  /// noticed behind it (M1).
   [[nodiscard]] std::optional<ContinuityMark> continuity_mark() const;
   void expect_marks(const std::vector<ContinuityMark>& marks);
   [[nodiscard]] std::vector<ContinuityMark> marks_until(const MoveProfile& start) const;

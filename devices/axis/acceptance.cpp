@@ -78,8 +78,6 @@ Result<void> Acceptance::permit(const Request& request, const CommandOptions& op
   return found.verdict();
 }
 
-/// Enters a command and makes it the one that is executed; whatever was executed before is aborted and
-/// halted.
 ActivityPtr Acceptance::begin(const Action& action, const CommandOptions& options, AxisState state,
                               Plan plan) {
   const bool waited = execution_.buffer().starts();

@@ -29,7 +29,6 @@ bool moves(CommandKind kind) {
 
 }  // namespace
 
-/// What the run before this one left: a drive that may run, and outcomes that nobody has looked at (M4).
 void EarlierCommands::take_over() {
   run_.take_over(context_.env.book->take_unsettled(context_.settings.name),
                  context_.env.clock->now() + settling_limit);

@@ -138,7 +138,6 @@ void Execution::end_waiting(const std::deque<Buffered>& commands, const Error& c
   }
 }
 
-/// Ends one that waits, and those behind it. False: it does not wait.
 bool Execution::cancel_buffered(const CommandPtr& command) {
   auto leaving = buffer_.cut(command);
   if (leaving.empty()) return false;
@@ -176,7 +175,6 @@ AxisState Execution::state() const {
   return plcopen_state(sources);
 }
 
-/// A held motion is being executed, and its hold is not over.
 bool Execution::holds() const {
   return activity_ && activity_->hold_until && context_.env.clock->now() < *activity_->hold_until &&
          current(*activity_);

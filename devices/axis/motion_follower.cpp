@@ -207,7 +207,6 @@ void MotionFollower::expect_end(const Plan& plan, std::int64_t base, TimePoint s
   context_.env.bus->give_up_readings(context_.settings.node);
 }
 
-/// A motion by that plan, which was acknowledged at `since`.
 MotionMachine MotionFollower::followed(const Plan& plan, std::int64_t base, TimePoint since) const {
   return MotionMachine({.since = since,
                         .predicted = plan.predicted,

@@ -98,7 +98,6 @@ MotionCause Publisher::motion_cause() const {
   return stop_.left_running() && !by_terminal ? MotionCause::command : MotionCause::unknown;
 }
 
-/// False: nothing was written since the last look. Else the next sample is published, whatever it says.
 bool Publisher::note_eeprom_writes() {
   const auto written = context_.drive->take_eeprom_writes();
   if (written.saves == 0) return false;
@@ -114,7 +113,6 @@ bool Publisher::note_eeprom_writes() {
   return true;
 }
 
-/// Of the drive, whatever it saves for.
 Result<void> Publisher::permit_saves(std::uint64_t saves) {
   note_eeprom_writes();
   const auto now = context_.env.clock->wall(context_.env.clock->now());

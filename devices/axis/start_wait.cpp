@@ -77,7 +77,6 @@ void StartWait::end_late(Activity& activity) {
   execution_.finish(activity, [&](CommandRecord& command) { command.abort(std::move(cause)); });
 }
 
-/// Nothing was sent for it, as it would have been too late. `cause`: where that was found.
 Error StartWait::late(const Activity& activity, Error cause) const {
   const auto waited = context_.env.clock->now() - activity.waits_since;
   if (activity.start.state() == StartMachine::State::set_down)

@@ -109,7 +109,6 @@ void StateReader::poll_fast(TimePoint from, Duration longest) {
   wake();
 }
 
-/// The drive was not restarted since its parameters were last written.
 Task<Result<void>> StateReader::prove_continuity(TransactionClass priority) {
   auto proof = co_await context_.drive->check_continuity(priority);
   if (proof) continuity_.proven(context_.env.clock->now());
@@ -227,7 +226,6 @@ bool StateReader::only_watches() const {
   return chains_ == 0 && !link_.bus_loss() && !drift_.drifted() && !drift_.drift_is_next();
 }
 
-/// The poll loop has something to look at.
 void StateReader::wake() {
   context_.env.bus->end_repetition(context_.settings.node);
   // A reading that came due since the stop began is waited for like those before.
@@ -248,8 +246,6 @@ void StateReader::watch_continuity() {
   continuity_watch_ = context_.env.clock->call_at(continuity_.next_look(now), [this] { watch_continuity(); });
 }
 
-/// Reads the drive's state, unless the last reading is not older than `oldest`. Errors: as of
-/// Drive::read_state().
 Task<Result<void>> StateReader::look(Duration oldest) {
   constexpr int attempts = 3;
   if (shaft_.sample() && shaft_.sample()->asked_at >= context_.env.clock->now() - oldest)
@@ -271,7 +267,6 @@ Task<Result<void>> StateReader::look(Duration oldest) {
   }
 }
 
-/// Waits for a sample whose request went out at `since` or later.
 Task<Result<DriveSample>> StateReader::sample_after(TimePoint since, Duration patience) {
   const auto deadline = context_.env.clock->now() + patience;
   wake();
