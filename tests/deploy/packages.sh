@@ -341,7 +341,7 @@ ctl state accept
 ctl release-stop --all
 as shift-a
 refused=$(ctl enable feeder 2>&1) && die "what may have been executed before was executed again"
-grep -q 'in [0-9]* s or later is new' <<<"$refused" || die "that says not until when: $refused"
+grep -q 'ask again in [0-9]* s' <<<"$refused" || die "that says not until when: $refused"
 ctl stop feeder --wait || die "stops have to wait, too"
 
 step "removing, and installing again"
